@@ -6,15 +6,25 @@ from rclpy.action.graph import get_action_server_names_and_types_by_node
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
+NOT_NAMED = "a node that is not known by name yet"
 
-def other_servers(node: Node, action: str) -> list[str]:
-    """Whole names of the nodes that serve `action` (a whole name) besides `node`; none of its own name, which may be
-    what is left of its killed predecessor."""
-    own = (node.get_name(), node.get_namespace())
-    nodes = sorted(set(node.get_node_names_and_namespaces()) - {own})
-    return [
-        f"{namespace.rstrip('/')}/{name}" for name, namespace in nodes if action in actions_of(node, name, namespace)
+
+def second_server(node: Node, action: str) -> str:
+    """Who serves `action` (a whole name) besides `node`; empty: nobody does.
+
+    Endpoints and names of nodes are discovered one after the other: a server that is counted and belongs to no known
+    node is a second one. Only nodes of this one's name are none: they may be what is left of its killed predecessor.
+    """
+    servers = node.count_services(f"{action}/_action/send_goal")
+    if servers <= 1:
+        return ""
+    own, nodes = (node.get_name(), node.get_namespace()), node.get_node_names_and_namespaces()
+    others = [
+        f"{namespace.rstrip('/')}/{name}"
+        for name, namespace in sorted(set(nodes) - {own})
+        if action in actions_of(node, name, namespace)
     ]
+    return ", ".join(others) or (NOT_NAMED if servers > nodes.count(own) else "")
 
 
 def actions_of(node: Node, name: str, namespace: str) -> set[str]:

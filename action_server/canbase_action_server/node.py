@@ -31,7 +31,7 @@ from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
 from canbase_action_server.action_name import action_name
-from canbase_action_server.action_servers import other_servers
+from canbase_action_server.action_servers import second_server
 from canbase_action_server.binding import Binding
 from canbase_action_server.cancel_rule import NO_UUID, meant
 from canbase_action_server.goal import GoalPhase
@@ -213,10 +213,8 @@ class DriveDistanceServer(Node):
     def _second_server(self, binding: Binding) -> str | None:
         """Why no goal of this action is accepted: a client's goal reaches both servers, and both would drive."""
         name = self._names[binding.name]
-        if self.count_services(f"{name}/_action/send_goal") <= 1:
-            return None
-        others = other_servers(self, name)
-        return f"{', '.join(others)} serves {name} too: {TWO_SERVERS}" if others else None
+        other = second_server(self, name)
+        return f"{other} serves {name} too: {TWO_SERVERS}" if other else None
 
     def _on_accepted(self, binding: Binding, handle: ServerGoalHandle) -> None:
         goal, now_s, uuid = handle.request, time.monotonic(), uuid_of(handle)

@@ -10,11 +10,13 @@ import pytest
 from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
 from canbase.msg import SafetyState
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point
 from nav2_msgs.action import BackUp, DriveOnHeading, Spin
 from rclpy.action import ActionClient, ActionServer
 
 from canbase_action_server.client import DriveClient
+from canbase_action_server.goal_client import REJECTION_QOS
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
 from support.ros_harness import Process, TestNode
@@ -61,6 +63,11 @@ class Stage:
         wrapped = self.result(handle)
         assert abs(self.base.speed_mps) < 0.02
         return wrapped.status, wrapped.result.error_code, wrapped.result.error_msg
+
+    def rejection(self, kind: str) -> str:
+        """Why a goal is rejected now."""
+        assert not self.send(kind).accepted
+        return self.log_reason()
 
     def log_reason(self) -> str:
         """Of the newest rejection."""
@@ -184,12 +191,19 @@ def test_the_shipped_sros2_policy_allows_all_that_the_server_has(stage: Stage) -
 
 def test_while_another_node_serves_the_same_name_no_goal_is_driven(stage: Stage) -> None:
     with TestNode("behavior_server") as nav2:
-        asked: list[Any] = []
-        server = ActionServer(nav2.node, Spin, "spin", asked.append)
-        stage.node.wait_for(lambda: stage.node.node.count_services("spin/_action/send_goal") == 2, 10.0, "discovery")
-        stage.node.spin_for(1.0)
-        assert not stage.send("spin", target_yaw=1.0).accepted  # the other one does not spin, and answers nothing
-        assert "/behavior_server serves /spin too" in stage.log_reason()
+        server = ActionServer(nav2.node, Spin, "spin", lambda _: None)  # it does not spin, and answers nothing
+        rejections: list[Any] = []
+        nav2.node.create_subscription(DiagnosticStatus, "spin/rejection", rejections.append, REJECTION_QOS)
+        stage.base.mux.active = "joystick"  # until our server knows the other one: its rejection arrives there
+        stage.node.spin_for(0.2)
+        while not rejections:
+            assert not stage.send("spin", target_yaw=1.0).accepted
+            nav2.spin_for(0.1)
+        stage.base.mux.active = ""
+        stage.node.spin_for(0.2)
+        assert not stage.send("spin", target_yaw=1.0).accepted
+        assert "serves /spin too" in stage.log_reason()
+        stage.node.wait_for(lambda: "/behavior_server serves" in stage.rejection("spin"), 10.0, "the other one's name")
         assert stage.base.yaw_rad == 0.0
         server.destroy()
     stage.node.wait_for(lambda: stage.node.node.count_services("spin/_action/send_goal") == 1, 10.0, "its end")
