@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from functools import partial
 from importlib import import_module
@@ -25,7 +26,7 @@ from canbase_cli.options import (
 from canbase_cli.raise_priority import raise_priority
 from canbase_runtime.latch_file import latch_folder
 from canbase_runtime.own_modules import module_command
-from canbase_runtime.single_instance import TakenError
+from canbase_runtime.single_instance import TakenError, bus_name, check
 from canbase_runtime.terminal import FAILED, fail, load_config
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 SERVICES: Final = ("driver", "velocity", "action-server", "watchdog", "sim")
 """Names of the commands here."""
+WITHOUT_ROS: Final = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
+"""The ROS wheels' start-up hook would start every Python of their environment a second time."""
 _PANEL: Final = "Services: one process each, as `canbase up` starts them"
 
 
@@ -62,8 +65,14 @@ def driver(
     with ros_needed():
         from canbase_driver.runtime.main import run
     leave_stop_file(robot, stop_file)
+
+    def before_the_first_frame() -> None:
+        if stop_file is None:
+            start_post_stop(robot)
+        raise_priority("driver")
+
     with right_start():
-        raise typer.Exit(run(robot, arguments, claim, autostart, partial(raise_priority, "driver")))
+        raise typer.Exit(run(robot, arguments, claim, autostart, before_the_first_frame))
 
 
 def _claim(robot: Robot) -> Claim:
@@ -141,10 +150,37 @@ def watchdog(
     robot = load_config(config).robot
     check_unused_ros_arguments(ctx)
     leave_stop_file(robot, stop_file)
+    if stop_file is None:
+        _refuse_second_watchdog(robot)
+        start_post_stop(robot)
     told = watchdog_config(robot).to_json()
-    # The ROS wheels' start-up hook would start every Python of their environment a second time.
-    environment = os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
-    os.execve(sys.executable, module_command("canbase_watchdog", "--config-json", told), environment)
+    os.execve(sys.executable, module_command("canbase_watchdog", "--config-json", told), os.environ | WITHOUT_ROS)
+
+
+def _refuse_second_watchdog(robot: Robot) -> None:
+    """Its end would send stop frames to the robot of the first one."""
+    try:
+        check("watchdog", bus_name(robot.bus.arguments()))
+    except TakenError as error:
+        fail(f"watchdog: {error}", FAILED)
+
+
+def start_post_stop(robot: Robot) -> None:
+    """A process that sends the stop frames when this one has ended, however it ends and whoever started it: it waits
+    for the end of a pipe whose only writer is this process. Where there is a --stop-file, its supervisor sends them."""
+    from canbase_config.derive import watchdog_config
+
+    reads, writes = os.pipe()
+    os.set_inheritable(writes, True)  # the watchdog replaces its program; child processes get no descriptors
+    subprocess.Popen(
+        module_command("canbase_watchdog.post_stop", "-"),
+        stdin=reads,
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,  # Ctrl-C at the terminal reaches this process, whose end it waits for
+        env=os.environ | WITHOUT_ROS,
+    )
+    os.write(writes, watchdog_config(robot).to_json().encode())
+    os.close(reads)
 
 
 def leave_stop_file(robot: Robot, path: Path | None) -> None:

@@ -52,14 +52,18 @@ class Stack:
         logs: Path | None = None,
         env: Mapping[str, str] | None = None,
         quiet_sim: bool = False,
+        stop_files: Path | None = None,
     ) -> None:
         """`sim`: simulated drives too. `ros_args`: for the parts with ROS. `logs`: a folder for the parts' output, one
         file each; None: they write to this terminal. `env`: their environment; None: that of this process.
-        `quiet_sim`: the simulated drives print warnings only."""
+        `quiet_sim`: the simulated drives print warnings only. `stop_files`: a folder for what `post_stop` needs; the
+        caller then sends the stop frames after the end of driver and watchdog; None: they are sent by themselves."""
         self._config = config
         self._options = ["--config", str(config), *(["--namespace", namespace] if namespace else [])]
         self._ros_args = list(ros_args)
-        self._sim_options = ["--quiet"] if quiet_sim else []
+        stop_file = [] if stop_files is None else ["--stop-file", str(stop_files / "stop.json")]
+        sim_options = ["--quiet"] if quiet_sim else []
+        self._own_options = {"sim": sim_options, "driver": stop_file, "watchdog": stop_file}
         self._parts = [part for part in START_ORDER if sim or part != "sim"]
         self._logs = logs
         self._env = None if env is None else dict(env)
@@ -125,8 +129,7 @@ class Stack:
 
     def _spawn(self, part: str) -> subprocess.Popen[bytes]:
         argv = module_command("canbase_cli.child", str(os.getpid()), part, *self._options)
-        if part == "sim":
-            argv += self._sim_options
+        argv += self._own_options.get(part, [])
         if part not in WITHOUT_ROS:
             argv += self._ros_args
         with ExitStack() as opened:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,8 +14,11 @@ from typing import Any
 import can
 import pytest
 
+from canbase_config.load import load_robot
 from canbase_config.watchdog import WatchdogConfig, WatchedLayout
+from canbase_runtime.single_instance import bus_name, take
 from canbase_watchdog.post_stop import LIMIT_S, main, plan
+from support.bus_tool import write_robot
 from support.udp_port import free_udp_port
 from support.watchdog_story import config
 
@@ -66,6 +70,51 @@ def test_quick_stops_first_and_pre_operational_after_them(
 
     assert frames_on(listener) == QUICK_STOPS * 3 + PRE_OPERATIONAL
     assert (ended.returncode, ended.stderr) == (0, "stop frames sent\n")
+
+
+WAITING = """
+import sys, time
+from canbase_cli.services import start_post_stop
+from canbase_config.load import load_robot
+start_post_stop(load_robot(sys.argv[1]).robot)
+print("started", flush=True)
+time.sleep(60)
+"""
+"""A process as driver and watchdog are: it has the stop frames sent after its end."""
+
+
+# started ── 0.5 s: SIGINT and SIGTERM to the process that waits ── SIGKILL of the one that it waits for ── stop frames
+def test_after_the_end_of_a_process_that_nobody_supervises(tmp_path: Path) -> None:
+    robot = write_robot(tmp_path, free_udp_port())
+    bus = load_robot(robot).robot.bus
+    with can.Bus(**bus.arguments()) as listener:
+        process = subprocess.Popen([sys.executable, "-c", WAITING, str(robot)], stdout=subprocess.PIPE)
+        assert process.stdout is not None
+        process.stdout.readline()
+        (waiting,) = children(process.pid)
+        assert listener.recv(0.5) is None
+        for number in (signal.SIGINT, signal.SIGTERM):
+            os.kill(waiting, number)
+        assert listener.recv(0.1) is None
+        process.kill()
+        process.communicate()
+        assert frames_on(listener) == QUICK_STOPS * 3 + PRE_OPERATIONAL
+
+
+def children(pid: int) -> list[int]:
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+# a watchdog holds the bus ── a second `canbase watchdog` ends ── no stop frames
+def test_a_second_watchdog_stops_no_robot_by_its_end(tmp_path: Path) -> None:
+    robot = write_robot(tmp_path, free_udp_port())
+    arguments = load_robot(robot).robot.bus.arguments()
+    with can.Bus(**arguments) as listener, take("watchdog", bus_name(arguments)):
+        command = [sys.executable, "-m", "canbase_cli", "watchdog", "--config", str(robot)]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert ended.returncode == 1
+        assert "watchdog" in ended.stderr
+        assert frames_on(listener) == []
 
 
 def test_both_axes_of_one_node_are_stopped_by_one_frame() -> None:

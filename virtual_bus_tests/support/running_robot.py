@@ -71,7 +71,10 @@ class RunningRobot:
         self.env = {"XDG_STATE_HOME": str(folder / "state"), **env, "ROS_DOMAIN_ID": str(domain)}
         self.config = robot_file(folder, changes)
         self.robot = load_robot(self.config).robot
-        self.stack = Stack(self.config, namespace=namespace, sim=True, logs=folder, env=os.environ | self.env)
+        # Nobody sends stop frames after the end of a process: what stops the base is what the tests are about.
+        self.stack = Stack(
+            self.config, namespace=namespace, sim=True, logs=folder, env=os.environ | self.env, stop_files=folder
+        )
         self.node = TestNode(namespace=namespace, domain_id=domain)
         self.status = self.node.record(DriverStatus, "motor_driver/status")
         self.odom = self.node.record(Odometry, "odom")

@@ -1,7 +1,10 @@
-"""`python -m canbase_watchdog.post_stop FILE`: stop frames from a process of its own, after a unit has ended.
+"""`python -m canbase_watchdog.post_stop FILE`: stop frames from a separate process, after driver or watchdog has ended.
 
 Needs the bus and nothing else that runs: no driver, no watchdog, no ROS, no robot.yaml. FILE is what `canbase driver`
 and `canbase watchdog` leave at their start (--stop-file). systemd calls it by ExecStopPost, after SIGKILL too.
+
+Without a --stop-file, driver and watchdog start it themselves with FILE `-`: it reads their pipe, which ends when they
+end, however they end. So the stop frames do not depend on who started them.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ QUICK_STOPS = 3
 PERIOD_S = 0.01
 LIMIT_S = 2
 """An adapter that blocks must not hold up the unit's restart: then the process is ended by SIGALRM."""
+PIPE = "-"
+"""FILE that stands for standard input."""
 
 
 def plan(config: WatchdogConfig) -> list[list[Frame]]:
@@ -51,21 +56,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if len(given) != 1:
         print("usage: python -m canbase_watchdog.post_stop FILE", file=sys.stderr)
         return 2
-    signal.alarm(LIMIT_S)
     try:
-        config = WatchdogConfig.from_json(Path(given[0]).read_text(encoding="utf-8"))
+        config = WatchdogConfig.from_json(_content(given[0]))
     except (OSError, TypeError, ValueError, KeyError, AttributeError) as error:
         print(
             f"{given[0]} does not describe what to stop: {error}. The driver writes it at its start.", file=sys.stderr
         )
         return 2
+    return _stop(config, quiet=given[0] == PIPE)  # at a terminal an orderly end is over by then
+
+
+def _content(file: str) -> str:
+    """The whole of FILE, from then on within LIMIT_S. A pipe is whole when its writer has ended; until then no signal
+    that ends the writer in an orderly way ends this process: its stop may still fail."""
+    if file == PIPE:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)
+        content = sys.stdin.read()
+        signal.alarm(LIMIT_S)
+        return content
+    signal.alarm(LIMIT_S)
+    return Path(file).read_text(encoding="utf-8")
+
+
+def _stop(config: WatchdogConfig, *, quiet: bool) -> int:
     try:
         with BusPort(config.bus_arguments) as bus:
             taken = send(plan(config), bus, time.sleep)
     except BusError as error:
         print(error, file=sys.stderr)
         return 1
-    print("stop frames sent" if taken else "the bus did not take all stop frames", file=sys.stderr)
+    if not taken:
+        print("the bus did not take all stop frames", file=sys.stderr)
+    elif not quiet:
+        print("stop frames sent", file=sys.stderr)
     return 0 if taken else 1
 
 
