@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Protocol
 
 from canbase_action_server.goal_queue import GoalQueue
@@ -14,6 +13,7 @@ from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import Received
 from canbase_runtime.stop_cause import StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 from drive_rig import Case
@@ -43,7 +43,7 @@ class Ours:
 
     def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
         """One control cycle."""
-        cycle = self._goal_queue.tick(replace(_inputs(odometry), odometry=odometry), now_s)
+        cycle = self._goal_queue.tick(_inputs(odometry), now_s)
         for end in cycle.ends:
             if end.outcome.code is not ErrorCode.OK:
                 raise RuntimeError(f"the goal failed: {end.outcome.message}")
@@ -91,9 +91,9 @@ class StopProfile:
 def _inputs(odometry: Odometry) -> Inputs:
     """A healthy robot."""
     at = odometry.received
-    safety = Safety(at, stops=False, cause=StopCause.NONE, detail="", estop=False)
-    driver = Driver(at, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=False, hears_command=True)
-    return Inputs(odometry, safety, driver, Mux(at, ""))
+    safety = Safety(stops=False, cause=StopCause.NONE, detail="", estop=False)
+    driver = Driver(DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=False, hears_command=True)
+    return Inputs(Received(odometry, at), Received(safety, at), Received(driver, at), Received(Mux(""), at))
 
 
 class FastStopProfile(StopProfile):

@@ -14,6 +14,7 @@ from canbase_action_server.motion import STOP
 from canbase_action_server.motion_limits import standstill_limits
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.standstill import Standstill, Verdict
+from canbase_action_server.state_topics import ODOMETRY
 from canbase_config.robot import Robot
 
 FAREWELL_S = 0.2
@@ -49,10 +50,11 @@ class ActiveGoal:
         return self._goal.phase if self._goal else GoalPhase.ENDED
 
     def take(self, request: Request, inputs: Inputs, now_s: float) -> None:
-        """The base now belongs to this goal. RuntimeError when it has an owner, or was never seen."""
-        if self.busy or inputs.odometry is None:
-            raise RuntimeError("a goal took a base that is not free, or of which no odometry was received")
-        start, motion = inputs.odometry, request.motion(self._robot, inputs.odometry)
+        """The base now belongs to this goal. RuntimeError when it has an owner, or its odometry is lost."""
+        start = inputs.odometry.within(ODOMETRY.timeout_s(self._robot), now_s)
+        if self.busy or start is None:
+            raise RuntimeError("a goal took a base that is not free, or whose odometry is lost")
+        motion = request.motion(self._robot, start)
         self._goal = GoalRun(self._robot, motion, start, now_s, request.terms.time_allowance_s)
         self._began = now_s
 

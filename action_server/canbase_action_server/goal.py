@@ -10,13 +10,14 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from canbase_action_server.causes import EndCause, Situation, cause_while_driving, cause_while_stopping
+from canbase_action_server.causes import ARRIVED, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Motion, Twist
 from canbase_action_server.motion_limits import standstill_limits
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.preconditions import action_source
 from canbase_action_server.standstill import Standstill, Verdict
+from canbase_action_server.state_topics import States
 from canbase_config.robot import Robot
 
 STOPPED_PATIENCE_S = 0.3
@@ -72,7 +73,7 @@ class GoalRun:
         self._started = self._ticked_at = now_s
         self._gap_s = 0.0
         self._phase = GoalPhase.DRIVING
-        self._cause = EndCause(ErrorCode.OK, "")
+        self._cause = ARRIVED
         self._standstill: Standstill | None = None
         self._last_odometry = start
         self._jumped = False
@@ -99,15 +100,17 @@ class GoalRun:
         if self._phase is GoalPhase.ENDED:
             raise RuntimeError("the goal has ended: it orders nothing any more")
         self._gap_s, self._ticked_at = now_s - self._ticked_at, now_s
-        self._observe(inputs, now_s)
-        order = self._drive(inputs, now_s) if self._phase is GoalPhase.DRIVING else self._stop(inputs, now_s)
+        states = States.at(self._robot, inputs, now_s)
+        self._observe(states, now_s)
+        situation = self._situation(inputs, states, now_s)
+        order = self._drive(situation) if self._phase is GoalPhase.DRIVING else self._stop(situation)
         return replace(order, feedback=self._feedback(now_s))
 
-    def _observe(self, inputs: Inputs, now_s: float) -> None:
-        odometry, safety = inputs.odometry, inputs.safety
-        if inputs.driver is not None:
-            at_start = self._pose_resets = inputs.driver.pose_resets if self._pose_resets is None else self._pose_resets
-            self._pose_was_reset = self._pose_was_reset or inputs.driver.pose_resets != at_start
+    def _observe(self, states: States, now_s: float) -> None:
+        odometry, safety, driver = states.odometry, states.safety, states.driver
+        if driver is not None:
+            at_start = self._pose_resets = driver.pose_resets if self._pose_resets is None else self._pose_resets
+            self._pose_was_reset = self._pose_was_reset or driver.pose_resets != at_start
         if odometry and odometry.received > self._last_odometry.received:
             known = not (self._pose_was_reset or self._jumped)  # else the pose is not about this motion any more
             self._jumped = self._jumped or (known and not self._motion.observe(odometry))
@@ -117,13 +120,14 @@ class GoalRun:
         since = now_s if self._stopped_since is None else self._stopped_since
         self._stopped_since = since if safety is not None and safety.stops else None
 
-    def _situation(self, inputs: Inputs, now_s: float) -> Situation:
+    def _situation(self, inputs: Inputs, states: States, now_s: float) -> Situation:
         action = self._robot.action
         return Situation(
+            robot=self._robot,
             inputs=inputs,
+            states=states,
             now_s=now_s,
             own_source=self._own_source,
-            odometry_timeout_s=self._robot.timeouts.odometry_s,
             gap_s=self._gap_s,
             odometry_jumped=self._jumped,
             pose_was_reset=self._pose_was_reset,
@@ -136,24 +140,25 @@ class GoalRun:
             overall_timeout_s=self._overall_s,
         )
 
-    def _drive(self, inputs: Inputs, now_s: float) -> Order:
-        cause = cause_while_driving(self._situation(inputs, now_s))
+    def _drive(self, situation: Situation) -> Order:
+        now_s, cause = situation.now_s, cause_while_driving(situation)
         if cause and cause.code is ErrorCode.NO_PROGRESS and self._near_enough():
-            cause = EndCause(ErrorCode.OK, "")
+            cause = ARRIVED
         twist = None if cause else self._motion.order(now_s)
         if twist is not None:
             return Order(twist)
-        self._cause = cause or EndCause(ErrorCode.OK, "")
+        self._cause = cause or ARRIVED
         self._go(GoalPhase.STOPPING)
         limits = standstill_limits(self._robot, self._motion.deceleration_mps2)
         self._standstill = Standstill(limits, now_s, self._motion.speed_mps(self._last_odometry))
         return Order(self._motion.stop(now_s))
 
-    def _stop(self, inputs: Inputs, now_s: float) -> Order:
+    def _stop(self, situation: Situation) -> Order:
+        now_s = situation.now_s
         self._motion.stop(now_s)
-        self._cause = cause_while_stopping(self._situation(inputs, now_s), self._cause.code) or self._cause
-        verdict = self._standstill.judge(inputs, now_s) if self._standstill else Verdict.WAIT
-        if self._cause.code is ErrorCode.TAKEN_OVER:
+        self._cause = cause_while_stopping(situation, self._cause) or self._cause
+        verdict = self._standstill.judge(situation.inputs, now_s) if self._standstill else Verdict.WAIT
+        if self._cause.hands_over:
             verdict = Verdict.HANDED_OVER
         if verdict is Verdict.WAIT:
             return Order(STOP)
@@ -174,11 +179,12 @@ class GoalRun:
     def _outcome(self, verdict: Verdict) -> Outcome:
         motion, cause = self._motion, self._cause
         if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
-            cause = EndCause(ErrorCode.DRIVE_FAULT, self._unconfirmed())
+            cause = replace(cause, code=ErrorCode.DRIVE_FAULT, message=self._unconfirmed())
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
-            cause = EndCause(ErrorCode.OVERSHOOT, "the base rolled past the goal: too fast for its load or the slope")
+            message = "the base rolled past the goal: too fast for its load or the slope"
+            cause = replace(cause, code=ErrorCode.OVERSHOOT, message=message)
         elif verdict is not Verdict.STANDS:
-            cause = EndCause(cause.code, f"{cause.message}; the base {verdict.value}")
+            cause = replace(cause, message=f"{cause.message}; the base {verdict.value}")
         went = motion.report()
         text = f"{cause.message}; {went}" if cause.message else f"{went}; at standstill"
         return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)

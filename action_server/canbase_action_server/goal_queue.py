@@ -16,6 +16,7 @@ Rules.
 8. A goal with `terms.reports_invalid` and invalid numbers is admitted at any time, ends at once with INVALID_GOAL, and
    preempts nobody.
 9. A goal that waits reports feedback too, at `WAITING_FEEDBACK_HZ`: so a client without feedback has no living server.
+10. A goal that waits ends when a topic that it depends on is lost (`state_topics.py`), with the code of that topic.
 """
 
 from __future__ import annotations
@@ -25,13 +26,14 @@ from dataclasses import dataclass, replace
 
 from canbase_action_server.active_goal import ActiveGoal
 from canbase_action_server.along_track import Pose
-from canbase_action_server.causes import CLIENT_SILENT, EndCause
+from canbase_action_server.causes import CLIENT_SILENT
 from canbase_action_server.goal import Feedback, GoalPhase, Order
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.preconditions import commanding_program, is_moving, state_reason
+from canbase_action_server.state_topics import STATE_TOPICS, States
 from canbase_config.robot import Robot
 
 WAITING_FEEDBACK_HZ = 1.0
@@ -46,6 +48,14 @@ class End:
 
     key: str
     outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Against:
+    """Why a goal that waits does not start any more."""
+
+    code: ErrorCode
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +176,7 @@ class GoalQueue:
     def give_up(self, code: ErrorCode, message: str, now_s: float) -> Cycle:
         """Ends all goals at once, the base standing or not, because the process has no more time."""
         order = self._owner.give_up(code, message, now_s)
-        return Cycle(STOP, ends=(self._ended(order) if order else ()) + self._flush(EndCause(code, message)))
+        return Cycle(STOP, ends=(self._ended(order) if order else ()) + self._flush(Against(code, message)))
 
     def _goals(self) -> tuple[Admitted, ...]:
         return (*((self._running,) if self._running else ()), *self._waiting)
@@ -189,18 +199,24 @@ class GoalQueue:
         self._waiting = deque(goal for goal, cause in causes if cause is None)
         return tuple(End(goal.key, _not_started(cause)) for goal, cause in causes if cause is not None)
 
-    def _against_waiting(self, goal: Admitted, inputs: Inputs, now_s: float) -> EndCause | None:
+    def _against_waiting(self, goal: Admitted, inputs: Inputs, now_s: float) -> Against | None:
         if self._failed:
-            return EndCause(ErrorCode.INTERNAL, "defect in the action server, see its log")
+            return Against(ErrorCode.INTERNAL, "defect in the action server, see its log")
         if goal.invalid is not None:
-            return EndCause(ErrorCode.INVALID_GOAL, goal.invalid)
+            return Against(ErrorCode.INVALID_GOAL, goal.invalid)
         if goal.canceled:
-            return EndCause(ErrorCode.CANCELED, "canceled by request")
+            return Against(ErrorCode.CANCELED, "canceled by request")
         if goal.preempted:
-            return EndCause(ErrorCode.PREEMPTED, "replaced by a newer goal")
+            return Against(ErrorCode.PREEMPTED, "replaced by a newer goal")
         if self._client_lost(goal, now_s):
-            return EndCause(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
-        return EndCause(ErrorCode.SHUTDOWN, "the action server is shutting down") if inputs.shutdown else None
+            return Against(ErrorCode.CLIENT_LOST, CLIENT_SILENT)
+        if inputs.shutdown:
+            return Against(ErrorCode.SHUTDOWN, "the action server is shutting down")
+        return self._lost(inputs, now_s)
+
+    def _lost(self, inputs: Inputs, now_s: float) -> Against | None:
+        silences = ((topic.code, topic.silence(self._robot, inputs, now_s)) for topic in STATE_TOPICS)
+        return next((Against(code, silence) for code, silence in silences if silence is not None), None)
 
     def _begin(self, inputs: Inputs, now_s: float) -> str | None:
         if self._owner.busy or not self._waiting:
@@ -215,7 +231,8 @@ class GoalQueue:
         return goal.key
 
     def _waits_for_release(self, goal: Admitted, inputs: Inputs, now_s: float) -> bool:
-        held = commanding_program(self._robot, inputs) or is_moving(self._robot, inputs)
+        states = States.at(self._robot, inputs, now_s)
+        held = commanding_program(self._robot, states) or is_moving(self._robot, states)
         if not held or now_s - goal.admitted >= goal.request.terms.release_s:
             return False
         return state_reason(self._robot, inputs, now_s, waits_for_program=True) is None
@@ -237,13 +254,13 @@ class GoalQueue:
         end, self._running = End(self._running.key, order.end), None
         if order.end.code.leaves_the_base_standing:
             return (end,)
-        return (end, *self._flush(EndCause(order.end.code, f"the goal before it ended with {order.end.code.name}")))
+        return (end, *self._flush(Against(order.end.code, f"the goal before it ended with {order.end.code.name}")))
 
-    def _flush(self, cause: EndCause) -> tuple[End, ...]:
+    def _flush(self, cause: Against) -> tuple[End, ...]:
         ends = tuple(End(goal.key, _not_started(cause)) for goal in self._waiting)
         self._waiting.clear()
         return ends
 
 
-def _not_started(cause: EndCause) -> Outcome:
+def _not_started(cause: Against) -> Outcome:
     return Outcome(cause.code, 0.0, 0.0, f"{cause.message}; it never started")

@@ -1,6 +1,6 @@
-"""What the goal sees of the rest of the robot, as plain data. All times are local monotonic receive times [s].
+"""What the goal receives from the rest of the robot, as plain data. All times are local monotonic receive times [s].
 
-The node fills these from its topics; None means: nothing received yet.
+The node fills these from its topics. `state_topics.py`: how old each may be, and what it means when it is missing.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from canbase_action_server.along_track import Pose
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import NEVER, Received
 from canbase_runtime.stop_cause import StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 
@@ -19,6 +20,7 @@ class Odometry:
     """One message of odom."""
 
     received: float
+    """The motion is measured between these times; `Received` decides whether it still counts."""
     pose: Pose
     linear_mps: float
     angular_radps: float
@@ -33,7 +35,6 @@ class Odometry:
 class Safety:
     """One message of safety_filter/state."""
 
-    received: float
     stops: bool
     cause: StopCause
     detail: str
@@ -44,7 +45,6 @@ class Safety:
 class Driver:
     """One message of motor_driver/status."""
 
-    received: float
     state: DriverState
     cause: str
     detail: str
@@ -61,7 +61,6 @@ class Driver:
 class Mux:
     """One message of velocity_mux/state: the name of the source that drives, empty for none."""
 
-    received: float
     active: str
     held_back: str = ""
     """Why cmd_vel_action is locked now, for every publisher; empty: it is not."""
@@ -71,18 +70,13 @@ class Mux:
 class Inputs:
     """Everything at one moment."""
 
-    odometry: Odometry | None = None
-    safety: Safety | None = None
-    driver: Driver | None = None
-    mux: Mux | None = None
+    odometry: Received[Odometry] = NEVER
+    safety: Received[Safety] = NEVER
+    driver: Received[Driver] = NEVER
+    mux: Received[Mux] = NEVER
     cancel_requested: bool = False
     preempted: bool = False
     """A newer goal waits for the base."""
     client_lost: bool = False
     """The client that must stay alive for this goal publishes its lease no longer."""
     shutdown: bool = False
-
-
-def age_s(received: float | None, now_s: float) -> float:
-    """Time since `received`; infinite when nothing was received."""
-    return math.inf if received is None else now_s - received

@@ -21,17 +21,16 @@ def odometry_in(message: OdometryMessage, received: float) -> Odometry | None:
     return odometry if odometry.finite() else None
 
 
-def safety_in(message: SafetyState, received: float) -> Safety:
+def safety_in(message: SafetyState) -> Safety:
     """From safety_filter/state."""
     stops = message.action == SafetyState.STOP
     detail = printable(message.detail, SENTENCE_LENGTH)
-    return Safety(received, stops, stop_cause(message.cause), detail, message.estop)
+    return Safety(stops, stop_cause(message.cause), detail, message.estop)
 
 
-def driver_in(message: DriverStatus, received: float) -> Driver:
+def driver_in(message: DriverStatus) -> Driver:
     """From motor_driver/status; a state that is not in the interface counts as offline."""
     return Driver(
-        received=received,
         state=driver_state(message.state),
         cause=printable(message.cause),
         detail=printable(message.detail, SENTENCE_LENGTH),
@@ -43,7 +42,7 @@ def driver_in(message: DriverStatus, received: float) -> Driver:
     )
 
 
-def mux_in(message: MuxState, received: float, own_source: str) -> Mux:
+def mux_in(message: MuxState, own_source: str) -> Mux:
     """From velocity_mux/state. `own_source`: name of the source that the goals' orders go to."""
     locked = (source.reason for source in message.sources if source.name == own_source and source.locked)
-    return Mux(received, printable(message.active), printable(next(locked, "")))
+    return Mux(printable(message.active), printable(next(locked, "")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from canbase_action_server.profile import ProfileLimits
 from canbase_action_server.standstill import StandstillLimits
+from canbase_action_server.state_topics import DRIVER, ODOMETRY
 from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
 
@@ -53,7 +54,8 @@ def standstill_limits(robot: Robot, deceleration_mps2: float) -> StandstillLimit
         angular_radps=2.0 * robot.base.standstill_mps / robot.base.track_m,
         noise_mps=robot.watchdog.motion_tolerance_mps,
         noise_radps=2.0 * robot.watchdog.motion_tolerance_mps / robot.base.track_m,
-        odometry_timeout_s=robot.timeouts.odometry_s,
+        odometry_timeout_s=ODOMETRY.timeout_s(robot),
+        driver_timeout_s=DRIVER.timeout_s(robot),
         deceleration_mps2=deceleration_mps2,
         give_up_s=standstill_s(robot),
     )

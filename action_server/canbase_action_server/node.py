@@ -47,6 +47,7 @@ from canbase_config.robot import Robot
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
+from canbase_runtime.received import Received
 from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
 
@@ -161,17 +162,17 @@ class DriveDistanceServer(Node):
             (serialized, received_s), self._odometry_waiting = self._odometry_waiting, None
             odometry = _odometry_from(serialized, received_s)
             if odometry is not None:
-                self._inputs = replace(self._inputs, odometry=odometry)
+                self._inputs = replace(self._inputs, odometry=Received(odometry, received_s))
         return self._inputs
 
     def _on_safety(self, message: SafetyState) -> None:
-        self._inputs = replace(self._inputs, safety=messages.safety_in(message, time.monotonic()))
+        self._inputs = replace(self._inputs, safety=Received(messages.safety_in(message), time.monotonic()))
 
     def _on_driver(self, message: DriverStatus) -> None:
-        self._inputs = replace(self._inputs, driver=messages.driver_in(message, time.monotonic()))
+        self._inputs = replace(self._inputs, driver=Received(messages.driver_in(message), time.monotonic()))
 
     def _on_mux(self, message: MuxState) -> None:
-        mux = messages.mux_in(message, time.monotonic(), self._own_source)
+        mux = Received(messages.mux_in(message, self._own_source), time.monotonic())
         self._inputs = replace(self._inputs, mux=mux)
 
     def _serve(self, binding: Binding) -> ActionServer:

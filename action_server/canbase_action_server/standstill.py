@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from canbase_action_server.inputs import Driver, Inputs, Odometry, age_s
+from canbase_action_server.inputs import Inputs, Odometry
 
 HOLD_S = 0.1
 """The base must be seen standing for this long."""
@@ -19,8 +19,6 @@ STILL_S = 0.2
 """A pose that did not move for this long shows standstill, even if the velocity is noisy."""
 SETTLE_S = 0.15
 """From the order to stand until it must show at the wheels."""
-DRIVER_AGE_S = 0.5
-"""motor_driver/status older than this is no evidence of standstill [s]."""
 BRAKING_RESERVE_S = 0.5
 """Added to the time that braking takes when nothing can be measured."""
 
@@ -44,6 +42,8 @@ class StandstillLimits:
     noise_mps: float
     noise_radps: float
     odometry_timeout_s: float
+    driver_timeout_s: float
+    """An older motor_driver/status is no evidence of standstill."""
     deceleration_mps2: float
     give_up_s: float
 
@@ -62,13 +62,15 @@ class Standstill:
 
     def judge(self, inputs: Inputs, now_s: float) -> Verdict:
         """Call once per control cycle."""
-        odometry, driver = inputs.odometry, inputs.driver
-        if odometry and age_s(odometry.received, now_s) <= self._limits.odometry_timeout_s:
-            still = self._is_still(odometry) and self._driver_says_so(driver, now_s)
+        odometry = inputs.odometry.within(self._limits.odometry_timeout_s, now_s)
+        driver = inputs.driver.within(self._limits.driver_timeout_s, now_s)
+        reported = driver is not None and driver.standstill and inputs.driver.received_at_s >= self._counts_from
+        if odometry is not None:
+            still = self._is_still(odometry) and reported
             return self._or_give_up(self._seen_standing(odometry) or still, now_s)
         self._standing_since = self._anchor = None
-        if driver and age_s(driver.received, now_s) <= DRIVER_AGE_S:
-            return self._or_give_up(self._driver_says_so(driver, now_s), now_s)
+        if driver is not None:
+            return self._or_give_up(reported, now_s)
         return Verdict.NOT_MEASURED if now_s >= self._braked else Verdict.WAIT
 
     def _seen_standing(self, odometry: Odometry) -> bool:
@@ -91,11 +93,6 @@ class Standstill:
         self._anchor = odometry if moves or odometry.received < self._counts_from else anchor
         quiet = abs(odometry.linear_mps) <= limits.noise_mps and abs(odometry.angular_radps) <= limits.noise_radps
         return quiet and odometry.received - self._anchor.received >= STILL_S
-
-    def _driver_says_so(self, driver: Driver | None, now_s: float) -> bool:
-        if driver is None or age_s(driver.received, now_s) > DRIVER_AGE_S:
-            return False
-        return driver.standstill and driver.received >= self._counts_from
 
     def _or_give_up(self, stands: bool, now_s: float) -> Verdict:
         if stands:

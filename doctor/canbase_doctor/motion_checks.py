@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from canbase_action_server.preconditions import action_source
+from canbase_action_server.state_topics import MUX
 from canbase_config.mux import MEASURED
 from canbase_doctor.check import Check, fail, ok, too_slow, warn
 from canbase_doctor.evidence import Evidence
@@ -50,7 +51,7 @@ def zeros_are_ordered(seen: Evidence) -> Check:
 
 def mux_owner(seen: Evidence) -> Check:
     """Does no other node drive, past the mux or through it?"""
-    name, mux = "who owns the base", seen.inputs.mux
+    name, mux = "who owns the base", seen.inputs.mux.within(MUX.timeout_s(seen.robot), seen.now_s)
     for topic in ("cmd_vel_mux", "cmd_vel"):
         nodes = [endpoint.node for endpoint in seen.publishers.get(topic, ())]
         if len(nodes) > 1:

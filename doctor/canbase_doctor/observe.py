@@ -34,6 +34,7 @@ from canbase_doctor.overload import Overload, load_per_core
 from canbase_doctor.probes import SERVER, Prober, action_types
 from canbase_doctor.server_processes import server_processes, talks_by
 from canbase_runtime.foreign_text import clean
+from canbase_runtime.received import NEVER, Received
 
 try:
     from tf2_msgs.msg import TFMessage as TFMessage
@@ -153,11 +154,13 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
 
 
 def _inputs(heard: dict[str, Heard], own_source: str) -> Inputs:
-    def last(topic: str, read: Any) -> Any:
-        return read(heard[topic].last, heard[topic].times_s[-1]) if heard[topic].messages else None
+    def last(topic: str, read: Any) -> Received[Any]:
+        value = read(heard[topic].last) if heard[topic].messages else None
+        return NEVER if value is None else Received(value, heard[topic].times_s[-1])
 
+    odom_at_s = heard["odom"].times_s[-1] if heard["odom"].messages else -math.inf
     return Inputs(
-        odometry=last("odom", messages.odometry_in),
+        odometry=last("odom", partial(messages.odometry_in, received=odom_at_s)),
         safety=last("safety_filter/state", messages.safety_in),
         driver=last("motor_driver/status", messages.driver_in),
         mux=last("velocity_mux/state", partial(messages.mux_in, own_source=own_source)),

@@ -24,6 +24,7 @@ from std_srvs.srv import Trigger
 from canbase_config.diagnostics import PERIOD_S as DIAGNOSTICS_PERIOD_S
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
+from canbase_config.state_age import STATE_PERIOD_S
 from canbase_config.stopping import ramp
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.latch_file import LatchKeeper
@@ -51,7 +52,6 @@ from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 from canbase_velocity.unexpected_publishers import UNKNOWN
 
-STATE_PERIOD_S = 0.1
 GRAPH_PERIOD_S = 0.5
 OLD = "refused: it may be old, because safety_filter did not run before it; send it again"
 MovingSources = Callable[[], Sequence[str]]

@@ -25,6 +25,7 @@ from std_msgs.msg import Bool
 from canbase_config.diagnostics import PERIOD_S as DIAGNOSTICS_PERIOD_S
 from canbase_config.mux import JOINTS, MEASURED, OUTPUTS, MuxSource
 from canbase_config.robot import Robot
+from canbase_config.state_age import STATE_PERIOD_S
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.joint_command import Refusal, base_velocity
 from canbase_runtime.journal import Journal, Voice
@@ -46,7 +47,6 @@ from canbase_velocity.steady import steady_timer
 from canbase_velocity.twist import Twist
 from canbase_velocity.unexpected_publishers import ForeignWatch
 
-STATE_PERIOD_S = 0.5
 GRAPH_PERIOD_S = 0.5
 
 

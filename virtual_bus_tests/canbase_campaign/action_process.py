@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal_queue import GoalQueue
@@ -15,6 +15,7 @@ from canbase_campaign.clock import Clock
 from canbase_campaign.process import Process, Topics
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
+from canbase_runtime.received import Received
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.mux import MuxDecision
 from canbase_velocity.twist import Twist
@@ -56,11 +57,7 @@ class ActionProcess(Process):
     def begin(self) -> None:
         """A new owner without a goal; it has received nothing."""
         self.goal_queue = GoalQueue(self._robot)
-        self._odometry: Odometry | None = None
-        self._safety: Safety | None = None
-        self._driver: Driver | None = None
-        self._mux: Mux | None = None
-        self._shutdown = False
+        self._inputs = Inputs()
         self._turned_at = self.clock.now_s
         self._period_s = 1.0 / self._robot.action.control_hz
         self.every(self._period_s, self._on_timer, phase_s=0.002)
@@ -73,7 +70,7 @@ class ActionProcess(Process):
 
     def end(self) -> None:
         """Its goal ends first, with a base that stands."""
-        self._shutdown = True
+        self._inputs = replace(self._inputs, shutdown=True)
 
     def send_goal(self, distance_m: float, speed_mps: float) -> None:
         """A client sends a goal. It is accepted or refused as in node.py."""
@@ -83,13 +80,10 @@ class ActionProcess(Process):
         """The client of the running goal wants it to end."""
         self.receive("cancels", 10, self._on_cancel)
 
-    def _inputs(self) -> Inputs:
-        return Inputs(self._odometry, self._safety, self._driver, self._mux, shutdown=self._shutdown)
-
     def _on_goal(self, distance_m: float, speed_mps: float) -> None:
         now_s = self.clock.now_s
         request = DriveRequest(distance_m, speed_mps)
-        if self.goal_queue.refusal(request, self._inputs(), now_s) is not None:
+        if self.goal_queue.refusal(request, self._inputs, now_s) is not None:
             self.refused += 1
             return
         self.goal_queue.admit(str(len(self.goals)), request, now_s)
@@ -104,7 +98,7 @@ class ActionProcess(Process):
         if self.goals and not self.goals[-1].ends:
             self.goals[-1].held_up_s += max(0.0, now_s - self._turned_at - self._period_s)
         self._turned_at = now_s
-        cycle = self.goal_queue.tick(self._inputs(), now_s)
+        cycle = self.goal_queue.tick(self._inputs, now_s)
         if cycle.twist is not None:
             self._topics.publish("cmd_vel_action", Twist(cycle.twist.linear_mps, cycle.twist.angular_radps))
         for end in cycle.ends:
@@ -115,13 +109,12 @@ class ActionProcess(Process):
 
     def _on_odometry(self, snapshot: DriverSnapshot) -> None:
         pose = Pose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
-        self._odometry = Odometry(
-            self.clock.now_s, pose, snapshot.odometry.twist.linear_mps, snapshot.odometry.twist.angular_radps
-        )
+        twist, now_s = snapshot.odometry.twist, self.clock.now_s
+        odometry = Odometry(now_s, pose, twist.linear_mps, twist.angular_radps)
+        self._inputs = replace(self._inputs, odometry=Received(odometry, now_s))
 
     def _on_driver(self, snapshot: DriverSnapshot) -> None:
-        self._driver = Driver(
-            received=self.clock.now_s,
+        driver = Driver(
             state=snapshot.state,
             cause=snapshot.finding.cause.value,
             detail=snapshot.finding.detail,
@@ -131,12 +124,15 @@ class ActionProcess(Process):
             hears_command=snapshot.command.fresh,
             pose_resets=snapshot.odometry.pose_resets,
         )
+        self._inputs = replace(self._inputs, driver=Received(driver, self.clock.now_s))
 
     def _on_safety(self, decision: Decision) -> None:
         stops, estop = decision.action is Action.STOP, decision.cause.is_estop
-        self._safety = Safety(self.clock.now_s, stops, decision.cause, decision.detail, estop)
+        safety = Safety(stops, decision.cause, decision.detail, estop)
+        self._inputs = replace(self._inputs, safety=Received(safety, self.clock.now_s))
 
     def _on_mux(self, decision: MuxDecision) -> None:
         own = self._own_source
         locked = (source.reason for source in decision.sources if source.name == own and source.locked)
-        self._mux = Mux(self.clock.now_s, decision.active or "", next(locked, ""))
+        mux = Mux(decision.active or "", next(locked, ""))
+        self._inputs = replace(self._inputs, mux=Received(mux, self.clock.now_s))

@@ -12,6 +12,7 @@ from canbase_campaign.disk import StopDisk
 from canbase_campaign.process import Process, Topics
 from canbase_config.mux import MuxLock
 from canbase_config.robot import Robot
+from canbase_config.state_age import STATE_PERIOD_S
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.clearance import Points
@@ -26,8 +27,6 @@ from canbase_velocity.safety_filter import FilterConfig
 from canbase_velocity.scan import Scan
 from canbase_velocity.twist import Twist
 
-STATE_PERIOD_S = 0.1
-MUX_STATE_PERIOD_S = 0.5
 LOCKS = {"lock": MuxLock(topic="lock", priority=255, required=False)}
 """It has a publisher only in a fault."""
 
@@ -132,7 +131,7 @@ class VelocityProcess(Process):
             self.filter.on_command(decision.twist, now_s)
             self._issue(self._filter_decides(now_s))
         told = decision.essence
-        if told != self._mux_told or now_s - self._mux_state_at >= MUX_STATE_PERIOD_S:
+        if told != self._mux_told or now_s - self._mux_state_at >= STATE_PERIOD_S:
             self._mux_told, self._mux_state_at = told, now_s
             self._topics.publish("velocity_mux/state", decision)
 

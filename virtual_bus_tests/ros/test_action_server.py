@@ -252,6 +252,25 @@ def test_what_goes_wrong_on_the_way_aborts_the_goal_with_its_own_code_and_the_ne
         stage.node.spin_for(0.2)
 
 
+@pytest.mark.parametrize(
+    ("name", "topic", "code"),
+    [
+        ("mux", "velocity_mux/state", ErrorCode.TAKEN_OVER),
+        ("safety", "safety_filter/state", ErrorCode.ESTOP),
+        ("driver", "motor_driver/status", ErrorCode.DRIVE_FAULT),
+    ],
+)
+def test_a_state_that_is_lost_ends_the_goal(stage: Stage, name: str, topic: str, code: ErrorCode) -> None:
+    drive = stage.drive_until_moving()
+    stage.base.silent.add(name)
+    lost_s = time.monotonic()
+    result = stage.end_of(drive)
+    assert (result.status, result.code) == (Status.ABORTED, code), result.message
+    assert f"no message on {topic} for 0.3" in result.message
+    assert set(stage.base.orders_since(lost_s + 0.5)) <= {0.0}
+    assert topic in stage.rejection(1.0, 0.2)
+
+
 def test_a_base_that_rolls_over_its_goal_stands_there_and_is_told_so(stage: Stage) -> None:
     drive = stage.drive_until_moving(0.5, 0.4)
     stage.base.ramp_mps2 = 0.2

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal import GoalRun
@@ -18,9 +18,11 @@ from canbase_action_server.outcome import Outcome
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import NEVER, Received
 from canbase_runtime.stop_cause import StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 
+T = TypeVar("T")
 STEP_S = 0.001
 COUNT_M = 2 * math.pi * 0.1 / (20 * 4096)
 """One encoder count at the rim of the bench robot's wheels."""
@@ -83,9 +85,8 @@ class Plant:
         return Odometry(received, Pose(x, y, yaw_rad), self.speed_mps, self.turn_radps)
 
 
-GOOD_SAFETY = Safety(received=0.0, stops=False, cause=StopCause.NONE, detail="", estop=False)
+GOOD_SAFETY = Safety(stops=False, cause=StopCause.NONE, detail="", estop=False)
 GOOD_DRIVER = Driver(
-    received=0.0,
     state=DriverState.ENABLED,
     cause="none",
     detail="",
@@ -94,14 +95,14 @@ GOOD_DRIVER = Driver(
     standstill=True,
     hears_command=True,
 )
-GOOD_MUX = Mux(received=0.0, active="")
+GOOD_MUX = Mux(active="")
 
 
 def good_inputs(odometry: Odometry) -> Inputs:
     """A healthy robot, everything received together with `odometry`."""
-    at = odometry.received
-    safety, driver = replace(GOOD_SAFETY, received=at), replace(GOOD_DRIVER, received=at)
-    return Inputs(odometry, safety, driver, replace(GOOD_MUX, received=at))
+    return replaced(
+        Inputs(), odometry.received, odometry=odometry, safety=GOOD_SAFETY, driver=GOOD_DRIVER, mux=GOOD_MUX
+    )
 
 
 @dataclass
@@ -113,17 +114,20 @@ class Story:
     robot: Robot = field(default_factory=bench_robot)
     odometry_hz: float = 50.0
     jitter: random.Random = field(default_factory=lambda: random.Random(1))
-    inputs: Inputs = field(default_factory=lambda: Inputs(None, GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX))
+    inputs: Inputs = field(default_factory=lambda: good_inputs(Plant().odometry(0.0)))
+    silent: set[str] = field(default_factory=set)
+    """Of safety, driver and mux: those whose state does not arrive."""
     at: dict[float, Callable[[Story], None]] = field(default_factory=dict)
     odometry_alive: bool = True
     fastest_mps: float = 0.0
     fastest_radps: float = 0.0
+    now_s: float = 0.0
     ended_at: float = 0.0
     orders: list[tuple[float, Twist]] = field(default_factory=list)
 
     def run(self, limit_s: float = 120.0) -> Outcome:
         """From the acceptance to the outcome, then half a second more to see whether something still moves."""
-        self.inputs = replaced(self.inputs, odometry=self.plant.odometry(0.0))
+        self.inputs = replaced(self.inputs, 0.0, odometry=self.plant.odometry(0.0))
         start = self.plant.odometry(0.0)
         goal = GoalRun(self.robot, self.request.motion(self.robot, start), start, 0.0)
         control_s, pending = 1.0 / self.robot.action.control_hz, sorted(self.at)
@@ -131,6 +135,7 @@ class Story:
         transit: deque[tuple[float, Odometry]] = deque()
         for tick in range(round(limit_s / STEP_S)):
             now_s = tick * STEP_S
+            self.now_s = now_s
             while pending and pending[0] <= now_s:
                 self.at[pending.pop(0)](self)
             if now_s >= next_odometry and self.odometry_alive:
@@ -138,7 +143,9 @@ class Story:
                 arrives = now_s + self.jitter.uniform(0.0, 0.4) / self.odometry_hz
                 transit.append((arrives, self.plant.odometry(arrives)))
             while transit and transit[0][0] <= now_s:
-                self.inputs = replaced(self.inputs, odometry=transit.popleft()[1])
+                self.inputs = replaced(self.inputs, now_s, odometry=transit.popleft()[1])
+            if tick % 100 == 0:
+                self.inputs = again(self.inputs, now_s, but=self.silent)
             if now_s >= next_control:
                 next_control += control_s
                 order = goal.tick(self.inputs, now_s)
@@ -175,7 +182,27 @@ def goal_run(robot: Robot, distance_m: float, speed_mps: float, start: Odometry)
     return GoalRun(robot, DriveRequest(distance_m, speed_mps).motion(robot, start), start, 0.0)
 
 
-def replaced(inputs: Inputs, **changes: object) -> Inputs:
-    """`inputs` with other fields."""
-    values = {name: getattr(inputs, name) for name in Inputs.__slots__}
-    return Inputs(**{**values, **changes})
+STATES = ("safety", "driver", "mux")
+
+
+def replaced(inputs: Inputs, now_s: float, **changes: object) -> Inputs:
+    """`inputs` with other values, each received at `now_s` [s]; None: it was never received."""
+    received = {
+        name: value if isinstance(value, bool | Received) else NEVER if value is None else Received(value, now_s)
+        for name, value in changes.items()
+    }
+    return replace(inputs, **received)  # type: ignore[arg-type]
+
+
+def again(inputs: Inputs, now_s: float, but: Collection[str] = ()) -> Inputs:
+    """Each state was published once more with the same values, except those of `but`."""
+    return replace(
+        inputs, **{name: replace(getattr(inputs, name), received_at_s=now_s) for name in STATES if name not in but}
+    )
+
+
+def value(received: Received[T]) -> T:
+    """The value, whatever its age."""
+    found = received.within(math.inf, 0.0)
+    assert found is not None
+    return found

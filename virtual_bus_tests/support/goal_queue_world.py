@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from canbase_action_server.along_track import Pose
@@ -15,7 +15,7 @@ from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_config.robot import Robot
-from support.action_plant import bench_robot, good_inputs
+from support.action_plant import GOOD_DRIVER, bench_robot, good_inputs, replaced, value
 
 PERIOD_S = 0.02
 Policy = Literal["reject", "queue", "preempt"]
@@ -61,7 +61,9 @@ class GoalQueueWorld:
     @property
     def inputs(self) -> Inputs:
         """Of this moment."""
-        return self.change(good_inputs(Odometry(self.now_s, self.pose, self.mps, self.radps)))
+        driver = replace(GOOD_DRIVER, standstill=self.mps == self.radps == 0.0)
+        healthy = good_inputs(Odometry(self.now_s, self.pose, self.mps, self.radps))
+        return self.change(replaced(healthy, self.now_s, driver=driver))
 
     @property
     def pose(self) -> Pose:
@@ -127,8 +129,8 @@ class GoalQueueWorld:
             self.goals[end.key].ended = self.now_s
             if end.key == self._owner:
                 self._owner = None
-        safety, limits = self.inputs.safety, self.robot.limits
-        wanted = STOP if cycle.twist is None or (safety and safety.stops) else cycle.twist
+        limits, stops = self.robot.limits, value(self.inputs.safety).stops
+        wanted = STOP if cycle.twist is None or stops else cycle.twist
         self.mps = _ramped(self.mps, wanted.linear_mps, limits.deceleration_mps2)
         self.radps = _ramped(self.radps, wanted.angular_radps, limits.angular_deceleration_radps2)
         self.turned_rad += self.radps * PERIOD_S

@@ -9,34 +9,50 @@ import pytest
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_request import DriveRequest
-from canbase_action_server.inputs import Driver, Inputs, Odometry, Safety
+from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
 from canbase_config.stopping import standstill_s
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import Received
 from canbase_runtime.stop_cause import StopCause
 from canbase_runtime.watchdog_view import WatchdogView
-from support.action_plant import GOOD_SAFETY, Plant, Story, bench_robot, drive, goal_run, replaced
+from support.action_plant import (
+    GOOD_SAFETY,
+    Plant,
+    Story,
+    bench_robot,
+    drive,
+    goal_run,
+    good_inputs,
+    replaced,
+    value,
+)
 
 OBSTACLE = replace(GOOD_SAFETY, stops=True, cause=StopCause.OBSTACLE, detail="0.12 m ahead")
 
 
-def safety(story: Story, value: Safety) -> None:
-    story.inputs = replaced(story.inputs, safety=value)
+def safety(story: Story, state: Safety) -> None:
+    story.inputs = replaced(story.inputs, story.now_s, safety=state)
 
 
 def driver(story: Story, **changes: object) -> None:
-    assert story.inputs.driver is not None
-    story.inputs = replaced(story.inputs, driver=replace(story.inputs.driver, **changes))  # type: ignore[arg-type]
+    changed = replace(value(story.inputs.driver), **changes)  # type: ignore[arg-type]
+    story.inputs = replaced(story.inputs, story.now_s, driver=changed)
 
 
 def cancel(story: Story) -> None:
-    story.inputs = replaced(story.inputs, cancel_requested=True)
+    story.inputs = replace(story.inputs, cancel_requested=True)
 
 
 def lose_odometry(story: Story) -> None:
     story.odometry_alive = False
+
+
+def lose_driver(story: Story) -> None:
+    story.odometry_alive = False
+    story.silent.add("driver")
 
 
 def zero_from(story: Story, start_s: float) -> bool:
@@ -95,7 +111,8 @@ def test_every_stop_of_the_filter_that_stays_ends_the_goal(cause: StopCause) -> 
 
 def test_odometry_lost_ends_on_the_word_of_the_driver() -> None:
     # Lost at 2.0, noticed at 2.2; the driver goes on telling that the base stands.
-    at = {2.0: lose_odometry, 2.6: lambda s: driver(s, received=2.6, standstill=True)}
+    at = {2.0: lose_odometry, 2.6: lambda s: driver(s, standstill=True)}
+    at[1.9] = lambda s: driver(s, standstill=False)
     story = drive(Plant(), 3.0, 0.3, at=at)
     end = story.run()
     assert end.code is ErrorCode.ODOMETRY_LOST
@@ -104,7 +121,7 @@ def test_odometry_lost_ends_on_the_word_of_the_driver() -> None:
 
 
 def test_odometry_and_driver_lost_ends_after_the_braking_time_and_says_that_nothing_was_measured() -> None:
-    story = drive(Plant(), 3.0, 0.3, at={2.0: lose_odometry})
+    story = drive(Plant(), 3.0, 0.3, at={2.0: lose_driver})
     end = story.run()
     assert end.code is ErrorCode.ODOMETRY_LOST
     assert "nothing confirms that it did" in end.message
@@ -117,10 +134,9 @@ def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() ->
     # It hangs from 1.0 s to 3.0 s. Then the newest odometry is taken in first, and looks fresh.
     robot, plant = bench_robot(), Plant()
     goal = goal_run(robot, 3.0, 0.3, plant.odometry(0.0))
-    inputs = drive(plant, 3.0, 0.3).inputs
     for tick in range(51):
-        goal.tick(replaced(inputs, odometry=plant.odometry(tick * 0.02)), tick * 0.02)
-    order = goal.tick(replaced(inputs, odometry=plant.odometry(3.0)), 3.0)
+        goal.tick(good_inputs(plant.odometry(tick * 0.02)), tick * 0.02)
+    order = goal.tick(good_inputs(plant.odometry(3.0)), 3.0)
     assert order.twist == Twist()
     assert goal.phase is GoalPhase.STOPPING
 
@@ -270,11 +286,11 @@ def test_a_base_that_rolls_over_the_distance_is_not_a_success() -> None:
 def test_an_ended_goal_orders_nothing() -> None:
     robot, start = bench_robot(), Plant().odometry(0.0)
     goal = goal_run(robot, 1.0, 0.3, start)
-    inputs = Inputs(odometry=start, shutdown=True)
+    inputs = replace(good_inputs(start), shutdown=True)
     now_s, end = 0.0, None
     while end is None:
         now_s += 0.02
-        inputs = replaced(inputs, odometry=Plant().odometry(now_s))
+        inputs = replace(good_inputs(Plant().odometry(now_s)), shutdown=True)
         end = goal.tick(inputs, now_s).end
     assert (goal.phase, end.code) == (GoalPhase.ENDED, ErrorCode.SHUTDOWN)
     with pytest.raises(RuntimeError, match="has ended"):
@@ -284,7 +300,7 @@ def test_an_ended_goal_orders_nothing() -> None:
 def test_feedback_comes_at_its_rate() -> None:
     robot, plant = bench_robot(), Plant()
     goal = goal_run(robot, 1.0, 0.3, plant.odometry(0.0))
-    orders = [goal.tick(Inputs(odometry=plant.odometry(cycle * 0.02)), cycle * 0.02) for cycle in range(100)]
+    orders = [goal.tick(good_inputs(plant.odometry(cycle * 0.02)), cycle * 0.02) for cycle in range(100)]
     assert 17 <= len([order for order in orders if order.feedback]) <= 21  # 2 s at 10 Hz
 
 
@@ -294,13 +310,15 @@ STILL = StandstillLimits(
     noise_mps=0.05,
     noise_radps=0.2,
     odometry_timeout_s=0.2,
+    driver_timeout_s=0.3,
     deceleration_mps2=1.0,
     give_up_s=3.0,
 )
 
 
 def moving_at(received: float, linear_mps: float, angular_radps: float = 0.0) -> Inputs:
-    return Inputs(odometry=replace(Plant().odometry(received), linear_mps=linear_mps, angular_radps=angular_radps))
+    odometry = replace(Plant().odometry(received), linear_mps=linear_mps, angular_radps=angular_radps)
+    return Inputs(Received(odometry, received))
 
 
 def test_standing_is_seen_for_a_while_after_the_order_had_time_to_act() -> None:
@@ -318,8 +336,7 @@ def test_turning_is_not_standing() -> None:
     assert watch.judge(moving_at(3.0, 0.0, 0.03), 3.0) is Verdict.STILL_MOVES
 
 
-STANDS = Driver(0.1, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True)
-"""The driver's status, received at 0.1 s."""
+STANDS = Driver(DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True)
 
 
 @pytest.mark.parametrize(
@@ -330,43 +347,42 @@ def test_noise_is_no_motion_where_the_driver_reports_standstill(
     linear_mps: float, angular_radps: float, seen: bool
 ) -> None:
     """t   0  ordered to stop ── 0.2  the pose is still, odom shows some speed ── 0.4  status: standstill"""
-    noisy, told = moving_at(0.2, linear_mps, angular_radps), replace(STANDS, received=0.41)
-    after_a_moment = replace(moving_at(0.41, linear_mps, angular_radps), driver=told)
+    noisy, after = (moving_at(at_s, linear_mps, angular_radps) for at_s in (0.2, 0.41))
+    after_a_moment = replaced(after, 0.41, driver=STANDS)
 
     def judged(*samples: Inputs) -> Verdict:
         watch = Standstill(STILL, began=0.0, speed_mps=0.3)
-        return [watch.judge(each, each.odometry.received) for each in samples if each.odometry][-1]
+        return [watch.judge(each, each.odometry.received_at_s) for each in samples][-1]
 
     assert judged(after_a_moment) is Verdict.WAIT, "a pose alone shows no motion"
-    assert judged(noisy, replace(after_a_moment, driver=STANDS)) is Verdict.WAIT, "of before the order could act"
-    assert judged(noisy, replace(after_a_moment, driver=replace(told, standstill=False))) is Verdict.WAIT
-    assert judged(noisy, replace(after_a_moment, driver=None)) is Verdict.WAIT
+    assert judged(noisy, replaced(after, 0.14, driver=STANDS)) is Verdict.WAIT, "of before the order could act"
+    assert judged(noisy, replaced(after, 0.41, driver=replace(STANDS, standstill=False))) is Verdict.WAIT
+    assert judged(noisy, after) is Verdict.WAIT
     assert (judged(noisy, after_a_moment) is Verdict.STANDS) is seen
 
 
 @pytest.mark.parametrize("moved", [Pose(0.0011, 0.0, 0.0), Pose(0.0, -0.0011, 0.0), Pose(0.0, 0.0, 0.0041)])
 def test_a_pose_that_moves_is_no_noise(moved: Pose) -> None:
     watch = Standstill(STILL, began=0.0, speed_mps=0.3)
-    before, after = moving_at(0.2, 0.02), replace(moving_at(0.41, 0.02), driver=replace(STANDS, received=0.41))
-    assert before.odometry is not None
-    assert after.odometry is not None
-    watch.judge(replace(before, odometry=replace(before.odometry, pose=Pose(0.0, 0.0, 0.0))), 0.2)
-    assert watch.judge(replace(after, odometry=replace(after.odometry, pose=moved)), 0.41) is Verdict.WAIT
+    for at_s, pose in ((0.2, Pose(0.0, 0.0, 0.0)), (0.41, moved)):
+        odometry = Odometry(at_s, pose, 0.02, 0.0)
+        assert watch.judge(replaced(Inputs(), at_s, odometry=odometry, driver=STANDS), at_s) is Verdict.WAIT
 
 
 def test_an_old_word_of_the_driver_is_no_word() -> None:
-    told = STANDS
     watch = Standstill(STILL, began=0.0, speed_mps=0.1)
-    assert watch.judge(Inputs(driver=told), 0.5) is Verdict.WAIT  # received before the order could act
-    assert watch.judge(Inputs(driver=replace(told, received=0.4)), 0.5) is Verdict.STANDS
+    assert (
+        watch.judge(Inputs(driver=Received(STANDS, 0.14)), 0.2) is Verdict.WAIT
+    )  # received before the order could act
+    assert watch.judge(Inputs(driver=Received(STANDS, 0.19)), 0.5) is Verdict.WAIT  # 0.31 s old
+    assert watch.judge(Inputs(driver=Received(STANDS, 0.2)), 0.5) is Verdict.STANDS
 
 
 def test_a_base_that_another_source_took_over_is_not_said_to_stand() -> None:
     """The joystick takes over at 0.3 m/s and drives on: the goal ends at once, and nothing was seen standing."""
 
     def take_over(story: Story) -> None:
-        assert story.inputs.mux is not None
-        story.inputs = replaced(story.inputs, mux=replace(story.inputs.mux, active="joystick"))
+        story.inputs = replaced(story.inputs, story.now_s, mux=Mux(active="joystick"))
 
     story = drive(Plant(), 3.0, 0.3, at={2.0: take_over})
     end = story.run()

@@ -19,7 +19,7 @@ from support.goal_queue_world import GoalQueueWorld, Policy, Told, robot_with
 
 
 def estop(inputs: Inputs) -> Inputs:
-    return replaced(inputs, safety=replace(GOOD_SAFETY, received=1e9, estop=True, detail="pressed"))
+    return replaced(inputs, math.inf, safety=replace(GOOD_SAFETY, estop=True, detail="pressed"))
 
 
 def test_reject_refuses_whatever_comes_while_a_goal_waits_or_runs() -> None:
@@ -209,7 +209,7 @@ def test_a_shutdown_ends_all() -> None:
     world = GoalQueueWorld(robot_with("queue"))
     keys = [world.ask_way(1.0) for _ in range(3)]
     world.run(1.0)
-    world.change = lambda inputs: replaced(inputs, shutdown=True)
+    world.change = lambda inputs: replace(inputs, shutdown=True)
     world.run_out()
     assert {world.code(key) for key in keys} == {ErrorCode.SHUTDOWN}
 

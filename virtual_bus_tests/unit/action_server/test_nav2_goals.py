@@ -15,7 +15,7 @@ from canbase_action_server.inputs import Inputs
 from canbase_action_server.nav2_request import RELEASE_S, BehaviorRequest, Target, back_up, drive_on_heading, spin
 from canbase_action_server.outcome import ErrorCode
 from canbase_runtime.stop_cause import StopCause
-from support.action_plant import GOOD_MUX, GOOD_SAFETY, bench_robot
+from support.action_plant import GOOD_MUX, GOOD_SAFETY, bench_robot, replaced
 from support.goal_queue_world import GoalQueueWorld, Policy, Told, robot_with
 
 ROBOT = bench_robot()
@@ -25,7 +25,7 @@ HALF_TRACK_M = ROBOT.base.track_m / 2.0
 def commanded_by(name: str) -> GoalQueueWorld:
     """A world in which this source of the mux has the base."""
     world = GoalQueueWorld(robot_with("reject"))
-    world.change = lambda inputs: replace(inputs, mux=replace(GOOD_MUX, received=world.now_s, active=name))
+    world.change = lambda inputs: replaced(inputs, world.now_s, mux=replace(GOOD_MUX, active=name))
     return world
 
 
@@ -173,9 +173,9 @@ def test_a_goal_does_not_wait_for_an_operator_nor_does_one_of_drive_distance_wai
 @pytest.mark.parametrize(
     ("change", "code"),
     [
-        ({"mux": replace(GOOD_MUX, received=1e9, active="joystick")}, ErrorCode.TAKEN_OVER),
-        ({"mux": replace(GOOD_MUX, received=1e9, active="navigation", held_back="pause")}, ErrorCode.TAKEN_OVER),
-        ({"safety": replace(GOOD_SAFETY, received=1e9, estop=True)}, ErrorCode.ESTOP),
+        ({"mux": replace(GOOD_MUX, active="joystick")}, ErrorCode.TAKEN_OVER),
+        ({"mux": replace(GOOD_MUX, active="navigation", held_back="pause")}, ErrorCode.TAKEN_OVER),
+        ({"safety": replace(GOOD_SAFETY, estop=True)}, ErrorCode.ESTOP),
     ],
 )
 def test_a_goal_that_waits_for_the_controller_ends_when_something_else_speaks_against_it(
@@ -184,7 +184,7 @@ def test_a_goal_that_waits_for_the_controller_ends_when_something_else_speaks_ag
     world = commanded_by("navigation")
     key = sent(world, spin(ROBOT, 1.0, 10.0))
     world.run(0.5)
-    world.change = lambda inputs: replace(inputs, **change)  # type: ignore[arg-type]
+    world.change = lambda inputs: replaced(inputs, world.now_s, **change)
     world.run(0.1)
     release(world)
     world.run(1.0)
@@ -224,10 +224,10 @@ class Disturbance:
 
     def _change(self, inputs: Inputs) -> Inputs:
         if self._obstacle:
-            stop = replace(GOOD_SAFETY, received=self._world.now_s, stops=True, cause=StopCause.OBSTACLE)
-            inputs = replace(inputs, safety=stop)
+            stop = replace(GOOD_SAFETY, stops=True, cause=StopCause.OBSTACLE)
+            inputs = replaced(inputs, self._world.now_s, safety=stop)
         if self._controller and self._world.goal_queue.running is None:
-            inputs = replace(inputs, mux=replace(GOOD_MUX, received=self._world.now_s, active="navigation"))
+            inputs = replaced(inputs, self._world.now_s, mux=replace(GOOD_MUX, active="navigation"))
         return inputs
 
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 import pytest
 
 from canbase_action_server.goal_request import DriveRequest
-from canbase_action_server.inputs import Inputs, Safety
-from canbase_action_server.preconditions import NO_SOURCE, STATE_TIMEOUT_S, action_source, state_reason
+from canbase_action_server.inputs import Safety
+from canbase_action_server.preconditions import NO_SOURCE, action_source, state_reason
 from canbase_config.mux import Mux, MuxSource
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.stop_cause import SCAN_LOST, StopCause
 from canbase_runtime.watchdog_view import WatchdogView
-from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, replaced
+from support.action_plant import GOOD_DRIVER, GOOD_MUX, GOOD_SAFETY, Plant, bench_robot, good_inputs, replaced
 
 ROBOT = bench_robot()  # action.*: 0.01 to 5 m, 0.02 to 0.5 m/s
 
@@ -22,7 +22,7 @@ def stopped(cause: StopCause) -> Safety:
     return replace(GOOD_SAFETY, stops=True, cause=cause, detail="as the test says")
 
 
-READY = Inputs(Plant().odometry(0.0), GOOD_SAFETY, GOOD_DRIVER, GOOD_MUX)
+READY = good_inputs(Plant().odometry(0.0))
 
 
 @pytest.mark.parametrize("distance_m", [0.01, -0.01, 0.011, 5.0, -5.0, 1.0])
@@ -54,7 +54,7 @@ def test_a_speed_outside_is_refused_with_its_range(speed_mps: float) -> None:
 
 def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
     assert state_reason(ROBOT, READY, 0.0) is None
-    assert state_reason(ROBOT, replaced(READY, mux=replace(GOOD_MUX, active="action")), 0.0) is None
+    assert state_reason(ROBOT, replaced(READY, 0.0, mux=replace(GOOD_MUX, active="action")), 0.0) is None
 
 
 @pytest.mark.parametrize(
@@ -79,13 +79,13 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
     ],
 )
 def test_each_thing_that_is_missing_is_named(changes: dict[str, object], reason: str) -> None:
-    assert reason in str(state_reason(ROBOT, replaced(READY, **changes), 0.0))
+    assert reason in str(state_reason(ROBOT, replaced(READY, 0.0, **changes), 0.0))
 
 
 @pytest.mark.parametrize("state", [state for state in DriverState if state is not DriverState.ENABLED])
 def test_every_state_of_the_driver_without_power_is_named_with_its_detail(state: DriverState) -> None:
     driver = replace(GOOD_DRIVER, state=state, detail="left_wheel: 0x2310")
-    assert state_reason(ROBOT, replaced(READY, driver=driver), 0.0) == (
+    assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == (
         f"motor_driver is {state.word}, not enabled: left_wheel: 0x2310"
     )
 
@@ -94,12 +94,13 @@ def test_every_state_of_the_driver_without_power_is_named_with_its_detail(state:
 def test_every_state_of_the_watchdog_but_ok_is_named_with_its_cause(view: WatchdogView) -> None:
     driver = replace(GOOD_DRIVER, watchdog=view, watchdog_cause="lease lost", state=DriverState.LATCHED)
     expected = f"watchdog is {view.value} (cause lease lost); start or reset it"
-    assert state_reason(ROBOT, replaced(READY, driver=driver), 0.0) == expected
+    assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == expected
 
 
 def test_of_several_causes_the_one_that_explains_the_others_is_named() -> None:
     everything = replaced(
         READY,
+        0.0,
         safety=replace(stopped(StopCause.ESTOP), estop=True),
         driver=replace(GOOD_DRIVER, state=DriverState.LATCHED, watchdog=WatchdogView.TRIPPED, hears_command=False),
         mux=replace(GOOD_MUX, active="joystick", held_back="locked: pause holds"),
@@ -115,21 +116,32 @@ def test_of_several_causes_the_one_that_explains_the_others_is_named() -> None:
         {"mux": GOOD_MUX},
     ):
         order.append(str(state_reason(ROBOT, everything, 0.0)).split(" ")[0])
-        everything = replaced(everything, **cure)
+        everything = replaced(everything, 0.0, **cure)
     assert order == ["emergency", "watchdog", "motor_driver", "motor_driver", "joystick", "laser", "velocity_mux"]
     assert state_reason(ROBOT, everything, 0.0) is None
 
 
 def test_an_obstacle_before_the_base_refuses_no_goal() -> None:
-    assert state_reason(ROBOT, replaced(READY, safety=stopped(StopCause.OBSTACLE)), 0.0) is None
+    assert state_reason(ROBOT, replaced(READY, 0.0, safety=stopped(StopCause.OBSTACLE)), 0.0) is None
 
 
-def test_old_messages_are_no_messages() -> None:
-    # odom may be 0.2 s old, the states 1.5 s.
-    assert state_reason(ROBOT, READY, 0.2) is None
-    assert "no message on odom for 0.21 s" in str(state_reason(ROBOT, READY, 0.21))
-    fresh = replaced(READY, odometry=Plant().odometry(1.6))
-    assert "no message on motor_driver/status" in str(state_reason(ROBOT, fresh, STATE_TIMEOUT_S + 0.1))
+@pytest.mark.parametrize(
+    ("name", "topic", "timeout_s"),
+    [
+        ("odometry", "odom", 0.2),
+        ("driver", "motor_driver/status", 0.3),
+        ("safety", "safety_filter/state", 0.3),
+        ("mux", "velocity_mux/state", 0.3),
+    ],
+)
+def test_old_messages_are_no_messages(name: str, topic: str, timeout_s: float) -> None:
+    def reason(age_s: float) -> str | None:
+        inputs = good_inputs(Plant().odometry(10.0))
+        old = replace(getattr(inputs, name), received_at_s=10.0 - age_s)
+        return state_reason(ROBOT, replace(inputs, **{name: old}), 10.0)
+
+    assert reason(timeout_s - 1e-9) is None
+    assert f"no message on {topic} for {timeout_s:.2f} s (timeout {timeout_s} s)" in str(reason(timeout_s + 1e-9))
 
 
 @pytest.mark.parametrize(

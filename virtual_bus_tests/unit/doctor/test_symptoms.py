@@ -29,6 +29,7 @@ from canbase_doctor.server_processes import server_processes, talks_by
 from canbase_doctor.symptom_checks import CHECKS, walk
 from canbase_doctor.symptoms import SYMPTOMS
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import Received
 from canbase_runtime.stop_cause import StopCause
 from canbase_runtime.watchdog_view import WatchdogView
 
@@ -81,10 +82,12 @@ def step(name: str, at_s: float = WALL_S - 2.0, uuid: str | None = "cd", **value
 
 
 INPUTS = Inputs(
-    odometry=OdometryInput(9.9, Pose(0.0, 0.0, 0.0), 0.0, 0.0),
-    safety=Safety(9.9, False, StopCause.NONE, "", False),
-    driver=Driver(9.9, DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True),
-    mux=Mux(9.9, ""),
+    odometry=Received(OdometryInput(9.9, Pose(0.0, 0.0, 0.0), 0.0, 0.0), 9.9),
+    safety=Received(Safety(False, StopCause.NONE, "", False), 9.9),
+    driver=Received(
+        Driver(DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True), 9.9
+    ),
+    mux=Received(Mux(""), 9.9),
 )
 HEALTHY = Evidence(
     robot=ROBOT,
@@ -139,7 +142,7 @@ def rejected(**numbers: float) -> Evidence:
 
 
 def muxed(mux: Mux | None) -> Evidence:
-    return replace(HEALTHY, inputs=replace(INPUTS, mux=mux))
+    return replace(HEALTHY, inputs=replace(INPUTS, mux=Received(mux, 9.9)))
 
 
 def driver(**values: Any) -> Evidence:
@@ -204,7 +207,7 @@ BROKEN = [
     ("moves-after-cancel", but(cmd_vel_action=heard(twist(0.2))), "zero on cmd_vel_action", "defect"),
     ("moves-after-cancel", publishing("cmd_vel_action", SENDER, CLIENT), "zero on cmd_vel_action", "/canbase_drive"),
     ("moves-after-cancel", publishing("cmd_vel", SENDER, CLIENT), "who owns the base", "cmd_vel is published by"),
-    ("moves-after-cancel", muxed(Mux(9.9, "joystick")), "who owns the base", "joystick"),
+    ("moves-after-cancel", muxed(Mux("joystick")), "who owns the base", "joystick"),
     ("moves-after-cancel", muxed(None), "who owns the base", "publishes nothing"),
     ("moves-after-cancel", but(motor_driver__status=Heard()), "driver and watchdog", "publishes nothing"),
     ("moves-after-cancel", driver(standstill=False), "driver and watchdog", "wheel turns"),

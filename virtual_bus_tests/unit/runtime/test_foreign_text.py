@@ -75,8 +75,8 @@ def test_the_frame_of_a_scan_and_the_details_of_other_nodes_come_in_escaped_and_
         placed_by_tf(FORGED + "x" * 1000, "base_link", {})
     assert str(told.value).isprintable()
     assert len(str(told.value)) < 160
-    safety = safety_in(SafetyState(cause=FORGED, detail=FORGED * 100), 0.0)
+    safety = safety_in(SafetyState(cause=FORGED, detail=FORGED * 100))
     assert safety.cause.value.isprintable()
     assert safety.detail.isprintable()
     assert len(safety.detail) == 500
-    assert mux_in(MuxState(active=FORGED), 0.0, "action").active.isprintable()
+    assert mux_in(MuxState(active=FORGED), "action").active.isprintable()

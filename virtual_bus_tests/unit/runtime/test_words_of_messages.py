@@ -13,7 +13,7 @@ from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 @pytest.mark.parametrize("word", ["", "OK", "ok ", "well"])
 def test_an_unknown_word_about_the_watchdog_is_not_ok(word: str) -> None:
     assert watchdog_view(word) is WatchdogView.UNKNOWN
-    assert driver_in(DriverStatus(watchdog=word), 0.0).watchdog is WatchdogView.UNKNOWN
+    assert driver_in(DriverStatus(watchdog=word)).watchdog is WatchdogView.UNKNOWN
 
 
 @pytest.mark.parametrize("view", WatchdogView)
@@ -23,7 +23,7 @@ def test_each_word_about_the_watchdog_is_read_back(view: WatchdogView) -> None:
 
 @pytest.mark.parametrize("cause", StopCause)
 def test_each_cause_is_read_back(cause: StopCause) -> None:
-    assert safety_in(SafetyState(cause=cause.value), 0.0).cause is cause
+    assert safety_in(SafetyState(cause=cause.value)).cause is cause
 
 
 def test_an_unknown_cause_is_neither_none_nor_one_of_the_known_groups() -> None:
