@@ -131,6 +131,11 @@ class Topics:
         self.arrivals: dict[str, Callable[[str, Any], None]] = {}
         """By topic: receives each message that is not lost, when it arrives."""
 
+    @property
+    def subscribed(self) -> set[str]:
+        """Every topic that a process receives."""
+        return set(self._subscribers)
+
     def loses(self, topic: str) -> bool:
         """Whether this message on `topic` gets lost."""
         return self._random.random() < self.loss.get(topic, 0.0)
