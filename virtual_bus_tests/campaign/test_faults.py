@@ -10,6 +10,7 @@ import pytest
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.forked import in_a_copy
 from canbase_campaign.plan import draw_plan
+from canbase_campaign.received_faults import RECEIVED_FAULTS
 from canbase_campaign.robots import SCENARIOS, draw_robot
 from canbase_campaign.scenario import Start
 from canbase_campaign.world import World
@@ -65,7 +66,7 @@ def test_a_driver_that_never_lets_go_leaves_the_power_on_after_a_touch(holds: bo
 
 ALONE = {
     "frame_duplication": {"foreign_master"}, "lease_garbage": set(), "orders_shuffled": set(), "orders_twice": set(),
-    "resets_too_early": set(), "status_lost": set(), "two_hands": set(),
+    "resets_too_early": set(), "status_lost": set(), "two_hands": set(), **{fault: set() for fault in RECEIVED_FAULTS},
 }  # fmt: skip
 """Faults with a row of their own in hazards.yaml, and what the watchdog may trip on."""
 ROBOT, PLANS = 0, 4

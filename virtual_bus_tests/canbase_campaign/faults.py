@@ -10,6 +10,7 @@ from canbase_campaign.drive_faults import DRIVE_FAULTS
 from canbase_campaign.fault import Kind
 from canbase_campaign.operator_faults import PEOPLE
 from canbase_campaign.process_faults import PROCESS_FAULTS
+from canbase_campaign.received_faults import RECEIVED_FAULTS
 from canbase_campaign.sensor_faults import SENSOR_FAULTS
 from canbase_campaign.topic_faults import TOPIC_FAULTS
 
@@ -19,6 +20,7 @@ FAULTS: dict[str, Kind] = {
     **DRIVE_FAULTS,
     **SENSOR_FAULTS,
     **TOPIC_FAULTS,
+    **RECEIVED_FAULTS,
     **PEOPLE,
 }
 """Every fault that a scenario may draw."""
@@ -35,6 +37,11 @@ ADDED = (
     "source_ends_before_stop",
     "stick_tapped",
     "stop_requested",
+    "topic_contradicted",
+    "topic_doubled",
+    "topic_late",
+    "topic_lost",
+    "topic_replayed",
     "two_on_a_lock",
     "watchdog_dies_torn",
     "watchdog_starved",

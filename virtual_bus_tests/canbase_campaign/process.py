@@ -10,6 +10,8 @@ from typing import Any
 from canbase_campaign.can_bus import Receiver
 from canbase_campaign.clock import Clock, call
 
+REMEMBERED = 40
+"""Messages of each topic, for a replay."""
 FRAMES_HELD = 2000
 """Frames or datagrams that the system keeps for a process that hangs."""
 
@@ -126,6 +128,10 @@ class Topics:
         """By topic: each message arrives up to so much later, and may overtake others."""
         self.twice: set[str] = set()
         """Topics whose messages arrive a second time."""
+        self.beside: dict[str, Callable[[Any], Any]] = {}
+        """By topic: what another publisher sends beside each message."""
+        self.history: dict[str, deque[Any]] = {}
+        """By topic: the last messages."""
         self.watch: Callable[[str, Any], None] | None = None
         """Receives every message with its topic, when it is sent."""
         self.arrivals: dict[str, Callable[[str, Any], None]] = {}
@@ -148,6 +154,12 @@ class Topics:
         """Send a message on its way to every subscriber."""
         if self.watch is not None:
             self.watch(topic, message)
+        self.history.setdefault(topic, deque(maxlen=REMEMBERED)).append(message)
+        if topic in self.beside:
+            self._send(topic, self.beside[topic](message))
+        self._send(topic, message)
+
+    def _send(self, topic: str, message: Any) -> None:
         for process, do in self._subscribers.get(topic, ()):
             if self.loses(topic):
                 continue

@@ -10,9 +10,10 @@ from itertools import product
 import pytest
 
 from canbase_action_server.goal_queue import GoalQueue
-from canbase_action_server.goal_request import DriveRequest
+from canbase_action_server.goal_request import DriveRequest, Request, RotateRequest
 from canbase_action_server.inputs import Inputs, Mux
 from canbase_action_server.motion import STOP
+from canbase_action_server.nav2_request import Target, back_up, drive_on_heading, spin
 from canbase_action_server.outcome import ErrorCode
 from canbase_action_server.state_topics import DRIVER, MUX, ODOMETRY, SAFETY, STATE_TOPICS, States
 from canbase_config.state_age import JITTER_S, STATE_PERIOD_S, state_timeout_s
@@ -148,3 +149,21 @@ def test_a_state_that_returns_does_not_revive_the_goal() -> None:
     assert end.stands
     assert all(twist == STOP for at_s, twist in story.orders if at_s > 2.33)
     assert math.isclose(story.ended_at, 2.8, abs_tol=0.1)
+
+
+@pytest.mark.parametrize("name", ["driver", "safety", "mux"])
+@pytest.mark.parametrize(
+    "request_",
+    [
+        RotateRequest(6.0, 1.0),
+        spin(ROBOT, 6.0, 30.0),
+        back_up(ROBOT, Target(2.0), 0.3, 30.0),
+        drive_on_heading(ROBOT, Target(2.0), 0.3, 30.0),
+    ],
+)
+def test_every_action_depends_on_the_same_states(request_: Request, name: str) -> None:
+    story = Story(Plant(), request_, at={2.0: lambda s: s.silent.add(name)})
+    end = story.run()
+    assert end.code is FIELDS[name].code
+    assert all(twist == STOP for at_s, twist in story.orders if at_s > 2.33)
+    assert end.stands
