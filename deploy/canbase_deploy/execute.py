@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import grp
 import os
 import pwd
+import select
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
@@ -122,12 +124,11 @@ class Executor:
     def _first_records(self, action: FirstRecords) -> None:
         if self._prefix != Path("/"):
             return
-        if Path(action.folder).exists():
+        folder = Path(action.folder)
+        if folder.exists() if self._dry_run else not first_records(folder, action.robot, action.user):
             self._tell("kept     ", action.folder)
-            return
-        self._tell("made     ", action.folder, "no stop is latched")
-        if not self._dry_run:
-            first_records(Path(action.folder), action.robot, action.user)
+        else:
+            self._tell("made     ", action.folder, "no stop is latched")
 
     def _below(self, path: PurePosixPath) -> Path:
         return self._prefix / path.relative_to("/")
@@ -136,17 +137,56 @@ class Executor:
         self._say(f"{what} {path}" + (f" ({more})" if more else ""))
 
 
-def first_records(folder: Path, robot: str, user: str) -> None:
-    """Clear records of stops in a new folder of this user. Raises OSError; KeyError without such a user."""
+def first_records(folder: Path, robot: str, user: str) -> bool:
+    """Clear records of stops in a new folder of this user; False: the folder is there, and nothing was touched.
+
+    The user may change what lies in the folder above it at any moment, so nothing there is done as root: this user
+    makes the records. Raises OSError; KeyError without such a user.
+    """
     account = pwd.getpwnam(user)
-    new_parent = not folder.parent.exists()
+    _make_for(account, folder.parent)
+    return as_user(account, lambda: create_first(folder, robot))
 
-    def chown(path: Path) -> None:
-        os.chown(path, account.pw_uid, account.pw_gid)
 
-    create_first(folder, robot, chown)
-    if new_parent:
-        chown(folder.parent)
+def _make_for(account: pwd.struct_passwd, folder: Path) -> None:
+    """A folder of that user in a folder of root, where it is not there."""
+    try:
+        folder.mkdir(mode=0o700, parents=True)
+    except FileExistsError:
+        return
+    os.chown(folder, account.pw_uid, account.pw_gid, follow_symlinks=False)
+
+
+def as_user(account: pwd.struct_passwd, do: Callable[[], bool]) -> bool:
+    """What `do` returns in a process that is this user for good. Raises OSError with the number of the one there."""
+    reads, writes = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            _become(account)
+            answer = b"yes" if do() else b"no"
+        except OSError as error:
+            answer = f"{error.errno or errno.EIO}:{error.strerror or error}: {error.filename}".encode()
+        except BaseException as error:  # noqa: BLE001 - this process must end here, whatever happens
+            answer = f"{errno.EIO}:{type(error).__name__}: {error}".encode()
+        os.write(writes, answer[: select.PIPE_BUF])
+        os._exit(0)
+    os.close(writes)
+    with open(reads, "rb") as pipe:
+        answer = pipe.read()
+    os.waitpid(child, 0)
+    if answer in (b"yes", b"no"):
+        return answer == b"yes"
+    number, _, text = answer.decode(errors="replace").partition(":")
+    raise OSError(int(number or errno.EIO), text or "the process of that user has died")
+
+
+def _become(account: pwd.struct_passwd) -> None:
+    """Root gives up all that it has; a user who installs for himself stays who he is."""
+    if os.geteuid() != account.pw_uid:
+        os.setgroups([])
+        os.setgid(account.pw_gid)
+        os.setuid(account.pw_uid)
 
 
 def _name(action: Action) -> str:

@@ -13,7 +13,7 @@ import shutil
 import socket
 import stat
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -67,10 +67,10 @@ def machine() -> str:
     return " ".join(found)
 
 
-def create_first(folder: Path, robot: str, chown: Callable[[Path], None] = lambda _path: None) -> bool:
+def create_first(folder: Path, robot: str) -> bool:
     """Clear records for a robot that has never had any; False, and nothing is touched: there is a folder already.
 
-    All of them or none. `chown`: gives a path to the user that the services run as. Raises OSError.
+    All of them or none. Call it as the user that the services run as. Raises OSError.
     """
     if folder.exists():
         return False
@@ -82,9 +82,7 @@ def create_first(folder: Path, robot: str, chown: Callable[[Path], None] = lambd
             path = new / f"{part}{SUFFIX}"
             owner = latch_record.owner_of(part, robot, machine())
             os.close(_put(path, latch_record.whole(Record(), owner)))
-            chown(path)
         _sync(new)
-        chown(new)
         new.rename(folder)
     except BaseException:
         shutil.rmtree(new, ignore_errors=True)
