@@ -1,11 +1,12 @@
 """Who could change what the services and root run: it has to belong to root, up to the top folder.
 
 Whoever may write one file of the environment, or rename a folder above it, is the watchdog at its next start, and root
-at the next `sudo canbase`. Looks at owners and modes alone and opens no file.
+at the next `sudo canbase`. Looks at owners, modes and access control lists alone and opens no file.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import pwd
 import stat
@@ -20,6 +21,8 @@ MOST_ENTRIES: Final = 500_000
 """More files than any environment has: half a minute on a slow disk. Beyond it the answer is no."""
 MOST_LINKS: Final = 40
 """In one path, as the kernel has it."""
+ACL: Final = "system.posix_acl_"
+"""Extended attributes: the list of a file, and the default one of a folder (acl(5))."""
 TOLD: Final = 3
 """So many faults are named; the cure of one is often that of all."""
 
@@ -30,6 +33,8 @@ class Fault:
 
     path: str
     why: str
+    by_acl: bool = False
+    """Owner and mode are right; an access control list gives more."""
 
     @property
     def is_deep(self) -> bool:
@@ -39,6 +44,8 @@ class Fault:
     def cure(self) -> str:
         """The command."""
         deep = "-R " if self.is_deep else ""
+        if self.by_acl:
+            return f"sudo setfacl {deep}-b {self.path}"
         return f"sudo chown {deep}root:root {self.path} && sudo chmod {deep}go-w {self.path}"
 
 
@@ -56,6 +63,16 @@ def fault(found: os.stat_result, *, above: bool, trusted: frozenset[int] = ROOT_
     if found.st_mode & stat.S_IWGRP and found.st_gid != ROOT:
         return f"is writable by the group {found.st_gid}"
     return ""
+
+
+def has_acl(path: str) -> bool:
+    """Whether it has a POSIX ACL, or passes one on to new files; a mode shows no more than its mask. Raises OSError."""
+    try:
+        return any(name.startswith(ACL) for name in os.listxattr(path, follow_symlinks=False))
+    except OSError as error:
+        if error.errno in (errno.ENOTSUP, errno.ENOENT):  # a file system without any; gone meanwhile
+            return False
+        raise
 
 
 def faults(paths: Iterable[str], trusted: frozenset[int] = ROOT_ALONE, most: int = MOST_ENTRIES) -> list[Fault]:
@@ -128,6 +145,12 @@ class _Walk:
             self._above.add(path)
         if why := fault(found, above=above, trusted=self._trusted):
             yield Fault(path, why)
+            return
+        try:
+            if has_acl(path):
+                yield Fault(path, "has an access control list", by_acl=True)
+        except OSError as error:
+            yield Fault(path, f"cannot be looked at: {error.strerror}")
 
     def _tree(self, top: str, links: list[str]) -> Iterator[Fault]:
         """Everything below `top`; targets of links are added to `links`."""

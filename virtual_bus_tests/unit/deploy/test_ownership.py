@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
+import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from canbase_deploy.ownership import ROOT, Fault, fault, faults, refusal
 from canbase_deploy.plan import InstallError
 
 ME = os.getuid()
+NO_ID = 2**32 - 1
 FOLDER, FILE, LINK = stat.S_IFDIR | 0o755, stat.S_IFREG | 0o644, stat.S_IFLNK | 0o777
 
 
@@ -75,6 +79,42 @@ def test_one_file_that_others_may_write_is_found_wherever_it_is(tree: Path) -> N
     (one,) = mine(tree)
 
     assert (one.path, one.why) == (str(tree / "lib/canbase_watchdog/policy.py"), "is writable by everybody")
+
+
+WRITABLE_FOR_ONE = struct.pack("<I" + 5 * "HHI", 2, 1, 7, NO_ID, 2, 7, 65534, 4, 5, NO_ID, 16, 7, NO_ID, 32, 5, NO_ID)
+"""acl(5) as the kernel stores it: owner rwx, user 65534 rwx, group r-x, mask rwx, others r-x."""
+
+
+@pytest.mark.parametrize("kind", ["access", "default"])
+def test_an_access_control_list_that_no_mode_shows_is_found(tree: Path, kind: str) -> None:
+    package = tree / "lib/canbase_watchdog"
+    try:
+        os.setxattr(package, f"system.posix_acl_{kind}", WRITABLE_FOR_ONE)
+    except OSError as error:
+        pytest.skip(f"this file system has no ACLs: {error}")
+    package.chmod(0o755)  # the mask: nothing of it is to be seen in a mode
+
+    (one,) = mine(tree)
+
+    assert (one.path, one.why) == (str(package), "has an access control list")
+    assert one.cure() == f"sudo setfacl -R -b {package}"
+    os.removexattr(package, f"system.posix_acl_{kind}")
+    assert mine(tree) == []
+
+
+def test_an_access_control_list_that_cannot_be_read_is_a_fault_and_none_where_there_can_be_none(
+    tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(number: int) -> Callable[..., list[str]]:
+        def listxattr(path: str, *, follow_symlinks: bool) -> list[str]:
+            raise OSError(number, os.strerror(number), path)
+
+        return listxattr
+
+    monkeypatch.setattr(os, "listxattr", refused(errno.ENOTSUP))
+    assert mine(tree) == []
+    monkeypatch.setattr(os, "listxattr", refused(errno.EACCES))
+    assert mine(tree)[0].why == "cannot be looked at: Permission denied"
 
 
 def test_a_tree_of_a_user_is_told_once_with_its_cure(tree: Path) -> None:
