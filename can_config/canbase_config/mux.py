@@ -50,8 +50,9 @@ class MuxSource(Section):
         ),
     ] = None
     same_clock: Annotated[
-        bool, Field(description="true: its stamps use this computer's clock, so their age is the delay")
-    ] = False
+        bool,
+        Field(description="true: its stamps use this computer's clock, or one kept in step: their age is the delay"),
+    ] = True
 
     @property
     def message_type(self) -> str:

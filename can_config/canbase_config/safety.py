@@ -38,6 +38,13 @@ class Scan(Section):
     frozen_s: Annotated[
         float, Field(ge=0.2, le=10.0, description="identical readings for longer: the scanner is frozen [s]")
     ] = 0.5
+    same_clock: Annotated[
+        bool,
+        Field(
+            description="true: its stamps use this computer's clock, or one kept in step: their age is the delay; "
+            "false: how old its scans are is unknown, what only it sees is limited to blind_mps"
+        ),
+    ] = True
     noisy: Annotated[
         bool, Field(description="false: a simulator without noise; equal readings count only while the base moves")
     ] = True

@@ -45,6 +45,44 @@ def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
         yield ("limits", "jerk_mps3"), _stuck(robot)
     if robot.rates.control_hz < SLOWEST_HZ:
         yield ("rates", "control_hz"), _slow_cycles(robot)
+    yield from _unknown_ages(robot)
+
+
+def _unknown_ages(robot: Robot) -> Iterator[tuple[Loc, str]]:
+    """Messages whose age nobody can know, and which speed that leaves."""
+    for index, scan in enumerate(robot.safety.scans):
+        place: Loc = ("safety", "scan") if index == 0 else ("safety", "more_scans", index - 1)
+        if not scan.noisy:
+            yield (*place, "noisy"), _simulated_scans(robot, scan.topic)
+        elif not scan.same_clock:
+            yield (*place, "same_clock"), _scans_of_any_age(robot, scan.topic)
+    for name, source in robot.mux.sources.items():
+        if not (source.stamped and source.same_clock):
+            key = "same_clock" if source.stamped else "stamped"
+            yield ("mux", "sources", name, key), _commands_of_any_age(robot, name)
+
+
+def _simulated_scans(robot: Robot, topic: str) -> str:
+    return (
+        f"scans on {topic} may be of any age: noisy false is for a simulator, whose stamps are of another time; a real "
+        f"base could meet what they do not show yet at {robot.limits.linear_mps:g} m/s"
+    )
+
+
+def _scans_of_any_age(robot: Robot, topic: str) -> str:
+    return (
+        f"how old the scans on {topic} are is unknown, so the base drives at most {robot.safety.blind_mps:g} m/s "
+        "(safety.blind_mps) where no other scanner looks; same_clock true, with clocks that chrony or PTP keeps in "
+        "step, lifts that"
+    )
+
+
+def _commands_of_any_age(robot: Robot, name: str) -> str:
+    return (
+        f"how old the commands of {name} are is unknown: after the operator has released the joystick the base drives "
+        f"on for as long as the network delays them, up to {robot.limits.linear_mps:g} m each second; stamped commands "
+        "with same_clock true end that"
+    )
 
 
 def _unproven_stand(robot: Robot) -> str:

@@ -170,10 +170,10 @@ class _Replayer:
         if name in self._config.mux.locks:
             self._mux.on_lock(name, locked, received)
 
-    def _scan(self, at_s: float, topic: str, scan: Any, placement: Placement | None) -> None:
+    def _scan(self, at_s: float, topic: str, scan: Any, placement: Placement | None, wall_s: float) -> None:
         placement = placement or self._placements.get(topic)
         if placement is not None:
-            self._seen(topic, self._filter.on_laser_scan, scan, placement, at_s)
+            self._seen(topic, self._filter.on_laser_scan, scan, placement, at_s, wall_s)
 
     def _seen(self, topic: str, take: Callable[..., None], *values: Any) -> None:
         """Of a scanner that the configuration has."""

@@ -125,12 +125,15 @@ def _names(values: Any) -> list[str]:
     return [str(each) for each in values]
 
 
-def _scan(topic: Any, told: Mapping[str, Any], placement: Any) -> Call:
+def _scan(topic: Any, told: Mapping[str, Any], placement: Any, wall_s: Any = None) -> Call:
+    """Of a recording without the time of its scans by the wall clock none was late."""
     fields = {name: told[name] for name in Scan.__slots__ if name != "ranges_m"}
     ranges = array(told["ranges_m"])
     if ranges.ndim != 1 or ranges.dtype.kind != "f":
         raise ValueError("a scan has one row of ranges")
-    return str(topic), Scan(ranges_m=ranges, **_scan_fields(fields)), _placement(placement)
+    scan = Scan(ranges_m=ranges, **_scan_fields(fields))
+    wall_s = (scan.stamp_ns or 0) * 1e-9 if wall_s is None else float(wall_s)
+    return str(topic), scan, _placement(placement), wall_s
 
 
 def _scan_fields(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,29 +1,28 @@
-"""How late the messages of one sender arrive, without a clock that it shares with this computer.
+"""How late the messages of one sender arrive.
 
-Each stamped message has an offset: local receive time minus its stamp. It is the difference of two clocks plus the time
-on the way. The least offset stands for the fastest way, and what is above it is delay. Rules:
-1. The least offset rises by DRIFT at most: so far clocks drift apart. A delay that stays is a delay for ever, also one
-   that grows slowly.
-2. A stamp below the one before means that the sender's clock was set back, or that another sender took over: the
-   offsets before it are worth nothing. A source of the mux needs a zero command then (neutral.py).
-3. After SILENCE_S without any message the sender's clock may have changed: the least offset of FORGET_S of
-   messages since then counts, if it is above the one before.
-4. With `same_clock` the age of the stamp itself is the delay, and a stamp from the future counts like an old one.
-A delay that is there from the first message on, and never less, cannot be seen without `same_clock`. Without stamps
-(an unstamped Twist, or a stamp of zero) no delay can be seen at all.
+Rules:
+1. With `same_clock` the age of the stamp is the delay. Nothing is learned from the messages, so no delay is forgotten:
+   neither one that is there from the first message on, nor one that grows slowly, nor over a restart. It ends when the
+   stamps are recent again. A stamp from the future is as bad as an old one.
+2. A sender with another clock: each message has an offset, local receive time minus its stamp. The least one ever
+   stands for the fastest way, and what is above it is delay. Neither messages nor time raise the least one: a clock
+   that drifts or is slewed back looks like a delay, and counts as one. A delay from the first message on is not seen:
+   how old its messages are is unknown (`canbase_config.stop_checks` says so at the start).
+3. A stamp below the one before: another message has overtaken this one, the sender's clock was set back, or another
+   sender took over. A source of the mux needs a zero command then (neutral.py).
+Without stamps (an unstamped Twist, or a stamp of zero) no delay can be seen at all.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
-DRIFT = 1e-3
-"""Seconds a second: quartz and the slewing of a time service (0.0005) together stay below it."""
-SILENCE_S = 60.0
-FORGET_S = 60.0
-SET_BACK_S = 0.005
+SET_BACK_S: Final = 0.005
 """Stamps of one sender may be out of order by less than this: no clock was set."""
+FUTURE_S: Final = 0.1
+"""So far a stamp may be ahead of this computer's clock: what a time service leaves between two computers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,33 +38,25 @@ class Sent:
 class Delay:
     """Of one sender. `set_back`: the last stamp was below the one before."""
 
-    def __init__(self, same_clock: bool = False) -> None:
+    def __init__(self, same_clock: bool) -> None:
         self._same_clock = same_clock
         self._least_s = math.inf
         self._stamp_s = -math.inf
-        self._at_s = -math.inf
-        self._silence_until = -math.inf
-        self._least_since_s = math.inf
         self.set_back = False
 
     def take(self, sent: Sent) -> float:
         """The delay of a message [s]; negative only with `same_clock`, for a stamp from the future."""
+        self.set_back = sent.stamp_s < self._stamp_s - SET_BACK_S
+        self._stamp_s = sent.stamp_s
         if self._same_clock:
             return sent.wall_s - sent.stamp_s
-        self.set_back = sent.stamp_s < self._stamp_s - SET_BACK_S
-        if self.set_back:
-            self._least_s = self._least_since_s = math.inf
         offset_s = sent.now_s - sent.stamp_s
-        self._least_s = min(self._least_s + DRIFT * max(0.0, sent.now_s - self._at_s), offset_s)
-        self._look_back(offset_s, sent.now_s)
-        self._stamp_s, self._at_s = sent.stamp_s, sent.now_s
+        self._least_s = min(self._least_s, offset_s)
         return offset_s - self._least_s
 
-    def _look_back(self, offset_s: float, now_s: float) -> None:
-        """Rule 3."""
-        if now_s - self._at_s > SILENCE_S:
-            self._silence_until, self._least_since_s = now_s, math.inf
-        self._least_since_s = min(self._least_since_s, offset_s)
-        if now_s - self._silence_until >= FORGET_S:
-            self._least_s = max(self._least_s, self._least_since_s)
-            self._silence_until = math.inf
+    def why_late(self, delay_s: float, limit_s: float) -> str:
+        """Why a message with this delay does not count, for people; empty: it does."""
+        clock = f"same_clock {str(self._same_clock).lower()}"
+        if delay_s > limit_s:
+            return f"delayed by {delay_s:.2f} s (limit {limit_s:.2f} s, {clock})"
+        return f"stamped in the future by {-delay_s:.2f} s ({clock})" if delay_s < -FUTURE_S else ""

@@ -204,7 +204,7 @@ class FilterNode(Node):
             self._voice.tell(crowd, Priority.ERROR, robot=self._robot.name)
 
     def _on_scan(self, config: ScanConfig, held: HeldPlacement, message: LaserScan) -> None:
-        now_s = time.monotonic()
+        now_s, wall_s = time.monotonic(), time.time()
         if self._receive_times.waited(now_s):
             return
         try:
@@ -218,8 +218,8 @@ class FilterNode(Node):
             self._filter.on_unplaced_scan(config.topic, str(error))
             return
         scan = messages.scan_of(message)
-        self._note("scan", now_s, config.topic, scan, placement if config.pose == "tf" else None)
-        self._filter.on_laser_scan(config.topic, scan, placement, now_s)
+        self._note("scan", now_s, config.topic, scan, placement if config.pose == "tf" else None, wall_s)
+        self._filter.on_laser_scan(config.topic, scan, placement, now_s, wall_s)
 
     def _look_for_scanners(self) -> None:
         """Into the ROS graph: a message does not contain its publisher."""

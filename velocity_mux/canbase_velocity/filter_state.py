@@ -50,7 +50,7 @@ class _Scanner:
         self._frozen = FrozenWatch(config.frozen_s, noisy=config.noisy)
         self._glitches = GlitchFilter(config.min_points)
         self.sole = SolePublisher()
-        self._delay = Delay()
+        self._delay = Delay(config.same_clock)
         self._reach_m = geometry.reach_m(config.timeout_s)
         self.at_s: float | None = None
         self.field: Field | None = None
@@ -62,7 +62,7 @@ class _Scanner:
         self._dropped = 0
         self._share: float | None = None
 
-    def receive(self, scan: Scan, placement: Placement, now_s: float, *, moves: bool) -> None:
+    def receive(self, scan: Scan, placement: Placement, now_s: float, wall_s: float, *, moves: bool) -> None:
         """A scan as it came. One that cannot be used is dropped and counted."""
         if self.sole.problem:
             self.drop(StopCause.SCAN_INVALID, self.sole.problem, at_once=True)
@@ -79,21 +79,22 @@ class _Scanner:
         if frozen:
             self.drop(StopCause.SCAN_FROZEN, frozen, at_once=True)
             return
-        late_s = self._late_s(scan, now_s)
+        late_s = self._late_s(scan, now_s, wall_s)
         if self._delay.set_back:
             self.drop(StopCause.SCAN_INVALID, "its stamp is below that of the scan before")
             return
-        if late_s > self.config.timeout_s:
-            self.drop(StopCause.SCAN_STALE, f"delayed by {late_s:.2f} s (limit {self.config.timeout_s:.2f} s)")
+        why_late = self._delay.why_late(late_s, self.config.timeout_s)
+        if why_late:
+            self.drop(StopCause.SCAN_STALE, why_late)
             return
         self._share = view.share
-        self.take(view.points, view.field, now_s - self._frozen.since + scan.scan_time_s + late_s, now_s)
+        self.take(view.points, view.field, now_s - self._frozen.since + scan.scan_time_s + max(late_s, 0.0), now_s)
 
-    def _late_s(self, scan: Scan, now_s: float) -> float:
-        """Above the fastest scan [s]. The stamps of a simulator are of its own time, which may be slower."""
-        if not (scan.stamp_ns and self.config.noisy):
+    def _late_s(self, scan: Scan, now_s: float, wall_s: float) -> float:
+        """[s]. The stamps of a simulator are of its own time, which may be slower."""
+        if scan.stamp_ns is None or not self.config.noisy:
             return 0.0
-        return self._delay.take(Sent(scan.stamp_ns * 1e-9, math.nan, now_s))
+        return self._delay.take(Sent(scan.stamp_ns * 1e-9, wall_s, now_s))
 
     def drop(self, cause: StopCause, why: str, *, at_once: bool = False) -> None:
         """A scan that does not count. `at_once`: neither does the one before; otherwise that counts until it is old."""
@@ -123,6 +124,7 @@ class _Scanner:
             self._dropped,
             self._why_dropped,
             self._share,
+            config.same_clock or not config.noisy,
         )
 
 
@@ -188,10 +190,11 @@ class SafetyFilter:
         """Takes what a scan shows. `field` None: it looks everywhere. Raises KeyError for another topic."""
         self._scanners[topic].take(points, field, scan_time_s, now_s)
 
-    def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now_s: float) -> None:
-        """Takes a scan as it came; drops and counts one that cannot be used. Raises KeyError for another topic."""
+    def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now_s: float, wall_s: float) -> None:
+        """Takes a scan as it came at `now_s` [s, monotonic], `wall_s` by this computer's clock; drops and counts one
+        that cannot be used. Raises KeyError for another topic."""
         self._motion.advance(now_s)
-        self._scanners[topic].receive(scan, placement, now_s, moves=not self._motion.moving.twist.is_zero)
+        self._scanners[topic].receive(scan, placement, now_s, wall_s, moves=not self._motion.moving.twist.is_zero)
 
     def on_scan_publishers(self, topic: str, nodes: Sequence[str], keys: Sequence[str], now_s: float) -> None:
         """Takes the publishers on the topic of a scanner: a node's name and a key for each. Raises KeyError for another
@@ -307,7 +310,8 @@ class SafetyFilter:
             parts.append(scanner.points)
             if not pose.is_at(there) and scanner.points.shape[0] > 0:
                 parts.append(pose.from_here(scanner.points, there))
-        fields = tuple(scanner.field for scanner in fresh if scanner.field is not None)
+        known = (scanner.field for scanner in fresh if scanner.state(now_s).knows_age)
+        fields = tuple(field for field in known if field is not None)
         sees_all = any(scanner.field is None for scanner in fresh)
         points = np.concatenate(parts) if len(parts) > 2 else parts[-1]
         return Sight(points, () if sees_all else fields)

@@ -127,7 +127,7 @@ class _Source:
         self.twist, self.at_s = twist, received
         self.delay_s = None if sent is None else self._delay.take(sent)
         if sent is not None and self._delay.set_back:
-            self.arming.disarm("the clock of its sender was set back")
+            self.arming.disarm("a command arrived after a newer one, or the clock of its sender was set back")
         self._late_from = min(self._late_from, now_s) if self.is_late else math.inf
         if now_s - self._late_from > LATE_S:
             self.arming.disarm("its commands arrived late")
@@ -145,9 +145,14 @@ class _Source:
             self.arming.disarm(f"a publisher on {self.config.topic} has ended")
 
     @property
+    def why_late(self) -> str:
+        """Why its last command came too late to be followed; empty: it did not."""
+        return "" if self.delay_s is None else self._delay.why_late(self.delay_s, self.config.timeout_s)
+
+    @property
     def is_late(self) -> bool:
-        """Its last command was on the way for longer than it may hold, or is stamped that far in the future."""
-        return self.delay_s is not None and abs(self.delay_s) > self.config.timeout_s
+        """Its last command was on the way for longer than it may hold, or is stamped in the future."""
+        return bool(self.why_late)
 
     def age_s(self, now_s: float) -> float | None:
         return None if self.at_s is None else now_s - self.at_s
@@ -161,9 +166,7 @@ class _Source:
     def standing(self) -> tuple[SourceStanding, str]:
         """Of the one that has the base."""
         if self.is_late:
-            what = "delayed by" if (self.delay_s or 0.0) > 0.0 else "stamped in the future by"
-            limit = f"(limit {self.config.timeout_s:.2f} s)"
-            return SourceStanding.DELAYED, f"{what} {abs(self.delay_s or 0.0):.2f} s {limit}"
+            return SourceStanding.DELAYED, self.why_late
         return (
             (SourceStanding.FOLLOWED, "")
             if self.arming.armed

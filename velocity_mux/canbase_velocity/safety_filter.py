@@ -86,6 +86,9 @@ class ScanState:
     usable_share: float | None = None
     """Of the beams of its last usable scan that have a reading, 0 to 1; None: none yet."""
 
+    knows_age: bool = True
+    """False: its stamps are of another clock. What it shows as free may have been so long ago."""
+
     @property
     def is_fresh(self) -> bool:
         """Its last scan counts."""
@@ -220,8 +223,11 @@ def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
         return [
             _blind(command, StopCause.BLIND, "the scans of every scanner have ended", "scans that can be used", config)
         ]
+    aged = [scan.topic for scan in inputs.scans if scan.is_fresh and not scan.knows_age]
     if not sight.fields:
-        return []
+        why = f"how old the scans on {', '.join(aged)} are is unknown (same_clock false)"
+        cure = "same_clock true, with clocks that agree"
+        return [_blind(command, StopCause.BLIND, why, cure, config)] if aged else []
     found = []
     if obstacle.is_blind(command, sight, geometry):
         why = "no scanner looks where the command leads"

@@ -159,7 +159,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),
     "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
     "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
-    "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now_s: 0.0),
+    "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now_s, wall_s: 0.0),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),
     "filter:zero_after_estop": _put(filter_state.SafetyFilter, "_advance_estop", _forget_estop),
     "action:timeout_and_progress": _drop(

@@ -31,6 +31,8 @@ ADDED = (
     "driver_deactivated",
     "driver_dies_torn",
     "driver_never_lets_go",
+    "scanner_clock_slewed",
+    "scanner_delayed",
     "scanner_late",
     "scanner_restarts",
     "setpoints_not_sent",

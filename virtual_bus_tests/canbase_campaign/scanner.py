@@ -43,6 +43,20 @@ def _mirrored(scan: Scan) -> Scan:
     )
 
 
+class _Slewed:
+    """Its stamps fall behind by SLEW_S more with each scan, up to `most_s`: chrony's fastest, ten scans a second."""
+
+    SLEW_S = 0.0083
+
+    def __init__(self, most_s: float) -> None:
+        self._most_s, self._scans = most_s, 0
+
+    def __call__(self, scan: Scan) -> Scan:
+        self._scans += 1
+        behind_s = min(self._scans * self.SLEW_S, self._most_s)
+        return dataclasses.replace(scan, stamp_ns=(scan.stamp_ns or 0) - round(behind_s * 1e9))
+
+
 LIES = {
     "scanner_blind": Lie("a scanner reads nothing but NaN", lambda: blind(NAN), hides=True),
     "scanner_blind_ahead": Lie("a scanner reads NaN in front", lambda: blind(NAN, 0.5), hides=True),
@@ -53,6 +67,8 @@ LIES = {
     "scanner_old_stamps": Lie("the same scan comes again and again", lambda: Frozen(new_stamps=False)),
     "scanner_by_turns": Lie("three old scans come by turns, with new stamps", lambda: ByTurns(3, new_stamps=True)),
     "scanner_late": Lie("each scan comes later than the one before", lambda: Late(2.0, per_s=1.0)),
+    "scanner_delayed": Lie("each scan comes a second late", lambda: Late(1.0)),
+    "scanner_clock_slewed": Lie("chrony slews the clock of a scanner's computer by 1 s", lambda: _Slewed(1.0)),
     "scanner_mirrored": Lie("a scanner counts the other way round", lambda: _mirrored),
 }
 

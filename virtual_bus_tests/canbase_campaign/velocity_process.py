@@ -145,8 +145,9 @@ class VelocityProcess(Process):
     def _on_scan(self, seen: Points | Scan) -> None:
         scan = self._robot.safety.scan
         if isinstance(seen, Scan):
-            self.note("scan", self.clock.now_s, scan.topic, seen, None)
-            self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), self.clock.now_s)
+            now_s = self.clock.now_s
+            self.note("scan", now_s, scan.topic, seen, None, now_s)
+            self.filter.on_laser_scan(scan.topic, seen, Placement.of(scan), now_s, now_s)
         else:
             self.note("points", self.clock.now_s, scan.topic, seen)
             self.filter.on_points(scan.topic, seen, None, self.clock.now_s)

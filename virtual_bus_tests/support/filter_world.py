@@ -88,9 +88,10 @@ class FilterWorld:
     def _scan(self, now_s: float) -> None:
         scanner = self.robot.safety.scan
         if self.lidar is not None:
-            scan = self.fault(self.lidar.scan(self.seen))  # its stamps go on while nothing is published
+            sound = self.lidar.scan(self.seen)  # its stamps go on while nothing is published
+            scan, wall_s = self.fault(sound), (sound.stamp_ns or 0) * 1e-9
             if self.scans:
-                self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now_s)
+                self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now_s, wall_s)
             return
         if not self.scans:
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -128,3 +129,41 @@ def test_slow_cycles_say_how_fast_a_wheel_without_an_encoder_gets(hz: float, tol
     sentences = dict(uncertain_stops(slow))
     assert (("rates", "control_hz") in sentences) == bool(told)
     assert told in sentences.get(("rates", "control_hz"), "")
+
+
+@pytest.mark.parametrize(("section", "place", "told"), [
+    (
+        {"safety": {"scan": {"same_clock": False}}},
+        ("safety", "scan", "same_clock"), "drives at most 0.15 m/s (safety.blind_mps)",
+    ),
+    ({"safety": {"scan": {"noisy": False}}}, ("safety", "scan", "noisy"), "scans on scan may be of any age"),
+    (
+        {"safety": {"more_scans": [{"required": True, "topic": "rear", "same_clock": False}]}},
+        ("safety", "more_scans", 0, "same_clock"), "how old the scans on rear are is unknown",
+    ),
+    (
+        {"mux": {"sources": {"joystick": {"same_clock": False}}}},
+        ("mux", "sources", "joystick", "same_clock"), "as long as the network delays them, up to 0.8 m each second",
+    ),
+    (
+        {"mux": {"sources": {"joystick": {"stamped": False}}}},
+        ("mux", "sources", "joystick", "stamped"), "how old the commands of joystick are is unknown",
+    ),
+])  # fmt: skip
+def test_messages_whose_age_is_unknown_are_warned_of_with_the_speed_that_is_left(
+    section: dict[str, Any], place: tuple[str | int, ...], told: str
+) -> None:
+    values = load_robot(sample("bench")).robot.model_dump()
+    assert not list(uncertain_stops(Robot.model_validate(values)))
+    _merge(values, section)
+    ((found, sentence),) = uncertain_stops(Robot.model_validate(values))
+    assert found == place
+    assert told in sentence
+
+
+def _merge(values: dict[str, Any], other: dict[str, Any]) -> None:
+    for key, value in other.items():
+        if isinstance(value, dict):
+            _merge(values[key], value)
+        else:
+            values[key] = value

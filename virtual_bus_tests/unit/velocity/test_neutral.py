@@ -253,7 +253,7 @@ def test_what_waited_in_the_radio_comes_at_once_after_a_stop_and_is_not_followed
     """Stamped: zero until 0.0; the stick is pushed in the gap; stop and reset; then 70 messages in one moment."""
 
     def say(twist: Twist, sent_s: float) -> None:
-        sent = Sent(1000.0 + sent_s, story.now_s, story.now_s)
+        sent = Sent(1000.0 + sent_s, 1000.0 + story.now_s, story.now_s)
         story.mux.on_command("joystick", twist, story.now_s, sent=sent)
 
     for _ in range(50):

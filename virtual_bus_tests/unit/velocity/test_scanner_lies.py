@@ -12,7 +12,7 @@ import math
 import numpy as np
 import pytest
 
-from canbase_campaign.lidar import ByTurns, Fault, Frozen, Late, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
+from canbase_campaign.lidar import ByTurns, Fault, Frozen, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import ScanReader
 from canbase_velocity.frozen import FrozenWatch
@@ -304,21 +304,6 @@ def test_two_scanners_on_one_topic_stop_the_base_until_the_next_start() -> None:
     assert made.decision.cause is StopCause.SCAN_INVALID
 
 
-# sound for 0.5 s ── each scan is handed out later, with the stamp of its measurement: a queue in the scanner's driver
-@pytest.mark.parametrize("per_s", [0.1, 0.3, 1.0, 100.0])
-@pytest.mark.parametrize("most_s", [1.0, 3.0])
-def test_scans_that_come_late_do_not_lead_into_the_wall(most_s: float, per_s: float) -> None:
-    """10 scans a second, and each one is new, noisy and complete."""
-    made = world()
-    made.obstacles = np.add(WALL, (4.0, 0.0))  # time enough for a queue to grow
-    least_m, causes, _ = lies(made, Late(most_s, per_s), 12.0)
-    assert least_m > 0.1
-    if most_s == 3.0 and per_s >= 0.3:
-        assert StopCause.SCAN_STALE in causes
-        assert made.decision is not None
-        assert "delayed by" in made.decision.detail
-
-
 # sound for 0.5 s ── the only scanner ends: with one of two that ended, too, the base would creep on its side
 def test_when_the_last_scanner_ends_that_is_not_required_the_base_creeps() -> None:
     made = FilterWorld(robot_with(scan={"required": False}), WALL)
@@ -332,32 +317,6 @@ def test_when_the_last_scanner_ends_that_is_not_required_the_base_creeps() -> No
     made.scans = True
     made.run(Twist(-0.3, 0.0), 0.5)
     assert cause_of(made) is StopCause.NONE
-
-
-def test_scans_that_are_always_as_late_are_the_scanner_s_own() -> None:
-    """A driver that stamps half a second before, by whatever clock: what it takes for each is no delay."""
-
-    def fault(scan: Scan) -> Scan:
-        assert scan.stamp_ns is not None
-        return dataclasses.replace(scan, stamp_ns=scan.stamp_ns + 10_000_000_000)
-
-    made = world()
-    made.fault = fault
-    made.run(AHEAD, 1.2)
-    assert made.decision is not None
-    assert made.decision.cause is StopCause.NONE
-    assert made.path_m > 0.3
-
-
-def test_a_scanner_whose_clock_is_set_back_loses_one_scan() -> None:
-    made = world()
-    made.run(AHEAD, 0.5)
-    made.fault = lambda scan: dataclasses.replace(scan, stamp_ns=(scan.stamp_ns or 0) - 100_000_000_000)
-    made.run(AHEAD, 0.5)
-    (scanner,) = made.filter.inputs(made.now_s).scans
-    assert scanner.dropped == 1
-    assert made.decision is not None
-    assert made.decision.cause is StopCause.NONE
 
 
 class Framed(Lidar):

@@ -77,7 +77,7 @@ class Base:
             number = self.cycle % 2
             if number in alive:
                 scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now_s * 1e9))
-                self.filter.on_laser_scan(self.topic, scan, PLACE, now_s)
+                self.filter.on_laser_scan(self.topic, scan, PLACE, now_s, now_s)
             self.filter.on_command(Twist(0.3, 0.0), now_s)
             decision = self.filter.decide(now_s)
             found.add((decision.action, decision.cause))
