@@ -113,7 +113,7 @@ class Safety(Section):
     blind_mps: Annotated[
         float,
         Field(
-            ge=0.0, le=5.0, description="speed limit in directions without usable readings; 0: no motion there [m/s]"
+            ge=0.0, le=0.3, description="speed limit in directions without usable readings; 0: no motion there [m/s]"
         ),
     ] = 0.15
     uncommissioned_mps: Annotated[
@@ -128,7 +128,7 @@ class Safety(Section):
     ] = False
     usable_share: Annotated[
         float,
-        Field(ge=0.5, le=1.0, description="least share of usable readings, of the directions that scanners cover"),
+        Field(ge=0.9, le=1.0, description="least share of usable readings, of the directions that scanners cover"),
     ] = 0.9
 
     @property

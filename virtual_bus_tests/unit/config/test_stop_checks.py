@@ -167,3 +167,13 @@ def _merge(values: dict[str, Any], other: dict[str, Any]) -> None:
             _merge(values[key], value)
         else:
             values[key] = value
+
+
+@pytest.mark.parametrize(("key", "value"), [("usable_share", 0.75), ("usable_share", 0.5), ("blind_mps", 3.0)])
+def test_keys_that_make_what_no_scanner_sees_count_as_free_are_refused(tmp_path: Path, key: str, value: float) -> None:
+    text = sample("bench").read_text()
+    assert "\nsafety:\n" in text
+    file = tmp_path / "robot.yaml"
+    file.write_text(text.replace("\nsafety:\n", f"\nsafety:\n  {key}: {value}\n"))
+    with pytest.raises(ConfigError, match=rf"safety\.{key}"):
+        load_robot(file)
