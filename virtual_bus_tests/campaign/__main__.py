@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 from rich.table import Table
 
 from campaign.removed_safeguards import SAFEGUARDS, refuse_compiled, remove
+from canbase_campaign.excuses import MOST_SHARE, MOST_STOP_SHARE, STOPS
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.judge import Violation
 from canbase_campaign.plan import draw_plan
@@ -57,6 +58,7 @@ def main(
     tally = _run(range(first, first + scenarios), workers, only, taken_out)
     _tell_faults(tally)
     _tell_sums(tally)
+    _tell_excuses(tally)
     _tell_violations(tally, only)
     if tally.broken_off:
         out.print(f"broken off after {tally.scenarios} of {scenarios} scenarios")
@@ -108,6 +110,19 @@ def _tell_sums(tally: Tally) -> None:
         f"{tally.virtual_s:.0f} s of virtual time, {tally.moved_m:.0f} m driven, "
         f"{ratio:.0f} s for each second of processor time"
     )
+
+
+def _tell_excuses(tally: Tally) -> None:
+    """What held by an excuse alone, by property."""
+    table = Table("property", "excused", "share", "by row", title=f"{tally.moving_s:.0f} s in motion: excused seconds")
+    for name in PROPERTIES:
+        rows = {row: seconds for (of, row), seconds in tally.excused_s.items() if of == name}
+        excused_s = sum(rows.values())
+        share = excused_s / tally.moving_s if tally.moving_s else 0.0
+        colour = "red" if share >= (MOST_STOP_SHARE if name in STOPS else MOST_SHARE) else "default"
+        by_row = ", ".join(f"{row} {seconds:.2f} s" for row, seconds in sorted(rows.items(), key=lambda item: -item[1]))
+        table.add_row(name, f"{excused_s:.2f} s", f"[{colour}]{share:.2%}[/]", by_row)
+    out.print(table)
 
 
 def _tell_violations(tally: Tally, only: list[str]) -> None:

@@ -13,6 +13,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
+from canbase_runtime.driver_state import DriverState
 from canbase_velocity.decision import Decision
 from canbase_velocity.twist import ZERO, Twist
 
@@ -55,6 +56,11 @@ class DriverProcess(Process):
         topics.subscribe("cmd_vel", self, self._on_command)
         topics.subscribe("safety_filter/state", self, self._on_safety)
         self.begin()
+
+    @property
+    def latched(self) -> bool:
+        """It reports a latched stop."""
+        return self.core.state is DriverState.LATCHED
 
     def begin(self) -> None:
         """A new core: nothing is booted, and its record decides what is latched."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from canbase_campaign.robots import DrawnRobot, rolls_out
-from canbase_config.derive import order_hold_s
 from canbase_config.robot import Robot
 from canbase_config.stopping import jerk_adds_s, max_wheel_mps
 
@@ -18,6 +17,8 @@ TICK_S = 0.005
 """Of the watchdog, and of the drives' own timers."""
 BUS_S = 0.03
 """A frame that waits for its turn, and one that is lost."""
+CYCLES = 2.0
+"""An order waits for the driver's next cycle, and its end is seen in the one after."""
 ORDER_S = 0.05
 """An order is renewed every 20 ms (rates.command_hz)."""
 OVERSHOOT_MPS = 0.006
@@ -36,7 +37,7 @@ class _Numbers:
         share_mps = watchdog.target_tolerance_share * max_wheel_mps(robot)
         self.tolerance_mps = watchdog.target_tolerance_mps + share_mps + OVERSHOOT_MPS
         self.tolerance_radps = 2.0 * self.tolerance_mps / robot.base.track_m
-        hold_s = order_hold_s(robot) - jerk_adds_s(limits)
+        hold_s = t.command_s + CYCLES / robot.rates.control_hz + watchdog.latency_s
         self.notice_s = max(hold_s, t.lease_s, t.watchdog_s, t.drive_heartbeat_s) + TICK_S + BUS_S
         self.deceleration_mps2 = limits.deceleration_mps2
         self.angular_deceleration_radps2 = limits.angular_deceleration_radps2
@@ -103,7 +104,8 @@ class Envelope:
 
     def __init__(self, react_s: float, now_s: float, coasting: float = 0.2) -> None:
         """`coasting`: of `coasting_share`; 0.2: of the sample robot."""
-        self._react_s, self._coasting = react_s, coasting
+        self.react_s, self._coasting = react_s, coasting
+        """`react_s` may change at any step: it is what the active faults leave to the layers."""
         self._order_s, self._ordered_at = 0.0, -math.inf
         self._most_s = 0.0
         """The greatest order since the last look: of two sources on one topic the driver may take either."""
@@ -133,7 +135,7 @@ class Envelope:
             return self._ordered_bound_s + ROUNDING_S
         self._beyond_s = 0.0 if lost else self._beyond_s + (elapsed_s if self._was_beyond else 0.0)
         self._was_beyond = True
-        if self._beyond_s <= self._react_s + ROUNDING_S:
+        if self._beyond_s <= self.react_s + ROUNDING_S:
             self._peak_s = max(self._peak_s, tau_s)
         else:
             self._peak_s -= fades_s

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from canbase_action_server.along_track import Pose, displacement
-from canbase_action_server.outcome import ErrorCode
 from canbase_campaign.action_process import Goal
-from canbase_campaign.odometry_judge import FLOOR_M, SHARE, true_pose
+from canbase_campaign.excuses import Ledger
+from canbase_campaign.odometry_judge import FLOOR_M, SHARE, Place, true_place
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
 from canbase_config.stopping import max_wheel_mps, standstill_s
@@ -20,17 +19,22 @@ TOLERANCES = 3.0
 class GoalJudge:
     """To be called every step, and at each end."""
 
-    def __init__(self, world: World, shown: Shown) -> None:
-        self._world, self._shown = world, shown
-        self._from: dict[int, Pose] = {}
+    def __init__(self, world: World, shown: Shown, ledger: Ledger) -> None:
+        self._world, self._shown, self._ledger = world, shown, ledger
+        self._from: dict[int, Place] = {}
         """Where the base truly was when a goal began; a goal during which an encoder lies is not compared."""
 
     def step(self) -> None:
         """Now."""
         for goal in self._world.action.goals[len(self._from) :]:
-            self._from[goal.number] = true_pose(self._world)
+            self._from[goal.number] = true_place(self._world)
         if not self._shown.tells_truth:
             self._from = dict.fromkeys(self._from, NOWHERE)
+            if self._runs():
+                self._ledger.excuse("goal", "encoder lies")
+
+    def _runs(self) -> bool:
+        return any(not goal.ends and not goal.died for goal in self._world.action.goals)
 
     def ended(self, goal: Goal) -> str:
         """What is wrong with this end; empty: nothing."""
@@ -39,7 +43,7 @@ class GoalJudge:
         took_s = goal.ended_at - goal.began
         if took_s > self._longest_s(goal) + goal.held_up_s + 1.0:
             return f"goal {goal.number} took {took_s:.1f} s"
-        return self._beside(goal) if goal.ends[-1].code is ErrorCode.OK else ""
+        return self._beside(goal) if goal.ends[-1].code.name == "OK" else ""
 
     @property
     def longest_s(self) -> float:
@@ -64,10 +68,10 @@ class GoalJudge:
         off_m, slack_m = abs(goal.ends[-1].traveled_m - goal.distance_m), TOLERANCES * robot.action.tolerance_m
         start = self._from.get(goal.number, NOWHERE)
         if start is not NOWHERE:
-            true_m = displacement(start, true_pose(self._world)).along_m
+            true_m = true_place(self._world).seen_from(start)[0]
             slips_m = FLOOR_M + SHARE * abs(goal.distance_m) + STEP_S * max_wheel_mps(robot)
             off_m = max(off_m, abs(true_m - goal.distance_m) - slips_m)
         return f"goal {goal.number} succeeded {off_m:.3f} m beside its distance" if off_m > slack_m else ""
 
 
-NOWHERE = Pose(math.nan, math.nan, math.nan)
+NOWHERE = Place(math.nan, math.nan, math.nan)

@@ -7,7 +7,9 @@ from collections import deque
 from dataclasses import dataclass
 from math import sqrt
 
+from canbase_campaign.allowance import is_late
 from canbase_campaign.envelope import notice_s
+from canbase_campaign.excuses import Ledger
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
@@ -91,7 +93,8 @@ class Greatest:
 class MotionJudge:
     """To be called every step. Times in seconds, virtual."""
 
-    def __init__(self, world: World, shown: Shown) -> None:
+    def __init__(self, world: World, shown: Shown, ledger: Ledger) -> None:
+        self._ledger = ledger
         self._world, self._half_m = world, world.robot.base.track_m / 2.0
         self._shown = shown
         self._allowed = Allowed.of(world.robot)
@@ -101,7 +104,7 @@ class MotionJudge:
         """Of these orders: the speed of a wheel, and the turn each way."""
         self.order(Twist(0.0, 0.0))
         self._fast_since = self._beside_since = self._lies_since = now_s
-        self._before_mps = 0.0
+        self._before_mps, self._lost = 0.0, False
         self._heartbeat_s = world.robot.timeouts.drive_heartbeat_s
         self._watchdog_s = world.robot.timeouts.watchdog_s
         self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
@@ -127,8 +130,7 @@ class MotionJudge:
 
         `lost`: no process reaches a drive that turns; one that does again has its time from there on.
         """
-        if lost:
-            self._fast_since = self._beside_since = self._lies_since = now_s
+        self._lost = lost
         while len(self._ordered_at) > 1 and self._ordered_at[1] < now_s - self._allowed.remembered_s:
             self._ordered_at.popleft()
             for greatest in (self._wheel, self._left, self._right):
@@ -143,11 +145,13 @@ class MotionJudge:
         nodes = self._world.drives.bench.nodes.values()
         return any(axis.state is State.OPERATION_ENABLED for node in nodes for axis in node.axes)
 
-    def _driven_mps(self) -> float:
-        """The faster side with a motor that drives or brakes it."""
+    def _driven_mps(self, fastest_mps: float) -> float:
+        """The faster side with a motor that drives or brakes it, where the fastest one may be that fast."""
         drives, (left, right) = self._world.drives, self._world.drives.sides
-        left_mps = 0.0 if drives.roll(left) else abs(self._shown.left_mps)
-        return max(left_mps, 0.0 if drives.roll(right) else abs(self._shown.right_mps))
+        left_mps, right_mps = abs(self._shown.left_mps), abs(self._shown.right_mps)
+        if max(left_mps, right_mps) <= fastest_mps:
+            return max(left_mps, right_mps)
+        return max(0.0 if drives.roll(left) else left_mps, 0.0 if drives.roll(right) else right_mps)
 
     def _rolls_blindly(self) -> bool:
         """The wheels of a side roll, with power, as their drives see nothing of it."""
@@ -167,20 +171,30 @@ class MotionJudge:
         return max(unasked * self._heartbeat_s, unwatched * self._watchdog_s)
 
     def _runaway(self, now_s: float) -> tuple[str, str] | None:
-        ordered_mps = self._wheel.value
-        wheel_mps = self._driven_mps()
-        if wheel_mps <= ordered_mps + self._allowed.runaway_mps:
+        fastest_mps = self._wheel.value + self._allowed.runaway_mps
+        wheel_mps = self._driven_mps(fastest_mps)
+        if wheel_mps <= fastest_mps:
+            rolls = self._shown.fastest_mps > fastest_mps and now_s > self._fast_since + self._allowed.runaway_s
+            if not rolls or self._ledger.excuse("runaway", "rolls out"):
+                self._fast_since = now_s
+        if self._lost and now_s > self._fast_since and self._ledger.excuse("runaway", "unreachable"):
             self._fast_since = now_s
-        if now_s <= self._fast_since + self._allowed.runaway_s + self._missed_s(now_s):
+        over_s = now_s - self._fast_since - self._allowed.runaway_s
+        if not is_late("runaway", self._ledger, over_s, [("unasked", self._missed_s(now_s))]):
             return None
-        return "runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {ordered_mps:.2f} m/s was the most ordered of it"
+        ordered = f"{self._wheel.value:.2f} m/s was the most ordered of it"
+        return "runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {ordered}"
 
     def _path(self, now_s: float) -> tuple[str, str] | None:
         """Between the slowest and the fastest turn that was ordered, zero among them, as a stop may come any time."""
         low, high = min(0.0, -self._right.value), max(0.0, self._left.value)
         turn = self._shown.angular_radps
         slack = self._allowed.path_radps + PATH_SHARE * max(-low, high)
-        if low - slack <= turn <= high + slack or not self._follows() or self._rolls_blindly():
+        if low - slack <= turn <= high + slack:
+            self._beside_since = now_s
+        rows = {"unreachable": self._lost, "no motor follows": not self._follows(), "rolls out": self._rolls_blindly()}
+        row = next((row for row, holds in rows.items() if holds), "")
+        if now_s > self._beside_since and row and self._ledger.excuse("path", row):
             self._beside_since = now_s
         if now_s <= self._beside_since + self._allowed.path_s:
             return None
@@ -196,9 +210,13 @@ class MotionJudge:
 
     def _standstill(self, now_s: float) -> tuple[str, str] | None:
         driver = self._world.driver
-        says = not self._unproven() and driver.running and driver.snapshot is not None and driver.snapshot.standstill
+        unproven = self._unproven()
+        says = driver.running and driver.snapshot is not None and driver.snapshot.standstill
         if not says or self._shown.fastest_mps <= self._allowed.stands_mps or math.isclose(now_s, self._lies_since):
             self._lies_since = now_s
+        for row, holds in (("unreachable", self._lost), ("unproven standstill", unproven)):
+            if holds and now_s > self._lies_since and self._ledger.excuse("standstill", row):
+                self._lies_since = now_s
         if now_s <= self._lies_since + STANDS_S:
             return None
         return "standstill", f"the driver says standstill, a wheel turns at {self._shown.fastest_mps:.2f} m/s"

@@ -1,89 +1,136 @@
-"""Is the driver's pose a pose that the base can have? Compared with the ground truth.
+"""Is the driver's pose a pose that the base can have? Each published one is compared with the ground truth.
 
-From each standstill after the driver's start, or after the driver reported that it missed some travel
-(`travel_losses`). A second drive with the same node id reports another position, while the first one sends nothing too:
-undetectable.
+From the first one of a driver's life on, in motion too. What the driver says about its own pose counts for nothing: a
+pose that it publishes is one that others follow. A new comparison begins where the truth says that no encoder could
+know: an encoder lied, a second drive answered with the same node id, a drive's counter began anew; or the driver had no
+line from a drive, and published nothing meanwhile: it cannot know whether that drive began to count anew.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Any
 
-from canbase_action_server.along_track import Pose, displacement
+from canbase_campaign.excuses import Ledger
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
 from canbase_config.stopping import max_wheel_mps
+from canbase_sim.cia301.nmt import NmtState
 
 BRAKES_MPS = 0.2
 """So much faster, or by what the drives brake since then, the base may have been when the newest sample was taken."""
+BOOTS_S = 1.0
+"""A driver that has a line again begins to boot the drive within this time [s]."""
 FLOOR_M, SHARE = 0.01, 0.03
 """What encoder steps, inner steps of the plant and cycles of different length may differ by."""
 
 
-def true_pose(world: World) -> Pose:
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the base is and where it heads: x forward, y to the left at the start [m], yaw [rad]."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+    def seen_from(self, start: Place) -> tuple[float, float]:
+        """Along the heading at `start`, and to its left [m]."""
+        dx_m, dy_m = self.x_m - start.x_m, self.y_m - start.y_m
+        cos, sin = math.cos(start.yaw_rad), math.sin(start.yaw_rad)
+        return cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m
+
+
+def true_place(world: World) -> Place:
     """Where the base is."""
     base = world.drives.bench.base
-    return Pose(base.x_m, base.y_m, base.turned_rad)
+    return Place(base.x_m, base.y_m, base.turned_rad)
 
 
 class OdometryJudge:
-    """To be called every step."""
+    """`take` every published pose; to `step` every step."""
 
-    def __init__(self, world: World, shown: Shown) -> None:
-        self._world, self._shown = world, shown
+    def __init__(self, world: World, shown: Shown, ledger: Ledger) -> None:
+        self._world, self._shown, self._ledger = world, shown, ledger
         self._fastest_mps = max_wheel_mps(world.robot)
         self._late_s = world.robot.timeouts.feedback_s + 2.0 / world.robot.rates.control_hz
-        """So old the newest sample may be while the driver calls its odometry valid."""
+        """So old the newest sample in a published pose may be."""
         limits = world.robot.limits
         self._braked_mps = self._late_s * (
             limits.deceleration_mps2 + limits.angular_deceleration_radps2 * world.robot.base.track_m / 2.0
         )
         self._core: object = None
-        self._seen_at = 0.0
-        self._losses = 0
-        self._lies_until = -math.inf
-        """How long the newest sample may be one of a faulty encoder, or of a second drive with the same node id."""
-        self._last: tuple[float, Pose] | None = None
-        self._origins: tuple[Pose, Pose] | None = None
-        self._path_from_m = 0.0
+        self._lies_until = self._restarts_until = -math.inf
+        """How long the newest sample may be one of a faulty encoder, or from before a counter began anew."""
+        self._read_at = dict.fromkeys(world.drives.bench.nodes, world.clock.now_s)
+        """When the driver had a line from each drive last."""
+        self._missed_at, self._gap_s = -math.inf, 2.5 / world.robot.rates.odometry_hz
+        """When one of them was last missing for longer than the newest sample may be old."""
+        self._axes = [world.drives.axis(wheel) for wheel in range(len(world.robot.drives))]
+        self._counters = self._counters_now()
+        self._last: tuple[float, Place] | None = None
+        self._origins: tuple[Place, Place] | None = None
+        self._path_from_m = self._rim_from_mps = 0.0
+        self._excused = False
 
-    def step(self, now_s: float) -> str:
-        """What is wrong now, or an empty text."""
-        if not self._shown.tells_truth:  # also while the driver hangs: it reads the counts of that time later
+    def step(self, now_s: float) -> None:
+        """What an encoder cannot know, also while the driver hangs: it reads the counts of that time later."""
+        if not self._shown.tells_truth:
             self._lies_until = now_s + self._late_s
-            self._origins = None
+        counters = self._counters_now()
+        if counters != self._counters:
+            self._counters, self._restarts_until = counters, now_s + self._late_s
+        self._look_at_lines(now_s)
+        rows = {"encoder lies": self._lies_until, "counter restarted": self._restarts_until}
+        self._excused = False
+        for row, until in rows.items():
+            if now_s <= until:
+                self._origins, self._excused = None, True
+                self._ledger.excuse("odometry", row)
+
+    def _look_at_lines(self, now_s: float) -> None:
+        world, blocked = self._world, self._world.bus.disturbance.blocked
+        for node_id, node in world.drives.bench.nodes.items():
+            sends = node.state is NmtState.OPERATIONAL and node.line.hears and not node.line.silent
+            reads = world.driver.running and not world.driver.bus_problem
+            if sends and reads and (f"drive{node_id}", "driver") not in blocked:
+                self._read_at[node_id] = now_s
+        if now_s > min(self._read_at.values()) + self._late_s:
+            self._missed_at = now_s
+            self._ledger.excuse("odometry", "unread")
+
+    def _counters_now(self) -> list[int]:
+        return [axis.encoder_offset for axis in self._axes]
+
+    def take(self, snapshot: Any, now_s: float) -> str:
+        """What is wrong with the pose in this message of odom, or an empty text."""
         driver = self._world.driver
-        snapshot = driver.snapshot
-        if snapshot is None or snapshot.time_s <= self._seen_at:
-            return ""
-        self._seen_at = snapshot.time_s
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
-        if now_s <= self._lies_until:
-            self._origins = None
-        if snapshot.odometry.travel_losses != self._losses:
-            self._losses, self._origins = snapshot.odometry.travel_losses, None
-        if not snapshot.odometry.valid:
-            return ""
-        pose = Pose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
-        return self._jump(pose, now_s) or (self._difference(pose) if now_s > self._lies_until else "")
+        last_at = self._last[0] if self._last is not None else math.inf
+        if last_at + self._gap_s < now_s and last_at <= self._missed_at + BOOTS_S:
+            self._origins = None  # it did not publish meanwhile, so nobody follows across that
+        pose = snapshot.odometry.pose
+        place = Place(pose.x_m, pose.y_m, pose.yaw_rad)
+        return self._jump(place, now_s) or ("" if self._excused else self._difference(place))
 
-    def _jump(self, pose: Pose, now_s: float) -> str:
-        last, self._last = self._last, (now_s, pose)
+    def _jump(self, place: Place, now_s: float) -> str:
+        last, self._last = self._last, (now_s, place)
         if last is None:
             return ""
-        way_m = math.hypot(pose.x_m - last[1].x_m, pose.y_m - last[1].y_m)
+        moved_m = math.hypot(place.x_m - last[1].x_m, place.y_m - last[1].y_m)
         possible_m = 1.1 * self._fastest_mps * (now_s - last[0] + self._late_s) + FLOOR_M
-        return f"pose moved {way_m:.3f} m in {now_s - last[0]:.3f} s" if way_m > possible_m else ""
+        return f"pose moved {moved_m:.3f} m in {now_s - last[0]:.3f} s" if moved_m > possible_m else ""
 
-    def _difference(self, pose: Pose) -> str:
-        base, truth = self._world.drives.bench.base, true_pose(self._world)
+    def _difference(self, place: Place) -> str:
+        base, truth = self._world.drives.bench.base, true_place(self._world)
+        rim_mps = max(abs(base.v_left_mps), abs(base.v_right_mps))
         if self._origins is None:
-            if abs(base.v_left_mps) + abs(base.v_right_mps) > 0.0:
-                return ""
-            self._origins, self._path_from_m = (pose, truth), base.path_m
-        seen, true = displacement(self._origins[0], pose), displacement(self._origins[1], truth)
-        off_m = math.hypot(seen.along_m - true.along_m, seen.lateral_m - true.lateral_m)
-        rim_mps = max(abs(base.v_left_mps), abs(base.v_right_mps)) + max(BRAKES_MPS, self._braked_mps)
-        possible_m = FLOOR_M + SHARE * (base.path_m - self._path_from_m) + self._late_s * rim_mps
+            self._origins, self._path_from_m = (place, truth), base.path_m
+            self._rim_from_mps = rim_mps + max(BRAKES_MPS, self._braked_mps) if rim_mps > 0.0 else 0.0
+            return ""
+        seen, true = place.seen_from(self._origins[0]), truth.seen_from(self._origins[1])
+        off_m = math.hypot(seen[0] - true[0], seen[1] - true[1])
+        rims_mps = rim_mps + max(BRAKES_MPS, self._braked_mps) + self._rim_from_mps
+        possible_m = FLOOR_M + SHARE * (base.path_m - self._path_from_m) + self._late_s * rims_mps
         return f"pose is {off_m:.3f} m beside the true one" if off_m > possible_m else ""

@@ -85,7 +85,7 @@ class Surroundings:
     def __init__(self, world: World, has_scanner: bool = True) -> None:
         """`has_scanner`: of a robot without one nothing is known about walls."""
         self._world = world
-        self.scan_s, self._button_s = publishes_s(world.robot)
+        self.scan_s, self.button_s = publishes_s(world.robot)
         self.pressed = False
         self.scans, self.speaks = has_scanner, True
         """The scanner sends, the stop button sends."""
@@ -166,4 +166,4 @@ class Surroundings:
 
     def _speak(self) -> None:
         self._tell()
-        self._world.clock.after(self._button_s, self._speak)
+        self._world.clock.after(self.button_s, self._speak)

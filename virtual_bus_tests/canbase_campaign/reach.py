@@ -12,7 +12,6 @@ from collections.abc import Iterable
 
 from canbase_campaign.envelope import tolerance_mps
 from canbase_campaign.world import World
-from canbase_config.stopping import BRAKING_SHARE
 from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia301.life_guarding import Life
 from canbase_sim.cia402.axis import Axis
@@ -20,8 +19,11 @@ from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_sim.personality import GENERIC, PERSONALITIES
 from canbase_sim.plant.motor import Motor
-from canbase_watchdog.ladder import RUNGS, Step
 
+LAST_RUNGS_S = 0.1 + 0.1
+"""Disable voltage, and heartbeat withheld: docs/bus.md."""
+LEAST_SHARE = 0.5
+"""A wheel that brakes with less of its stated deceleration does not brake as it must: docs/bus.md."""
 RESETS_S = 0.2
 """From the last rung of the watchdog's ladder until the drive is without power: feedback by SDO, late cycles [s]."""
 BRAKES_S = 0.3
@@ -57,10 +59,9 @@ class Reach:
         self._reacts_since: dict[int, float] = {}
         """Drives in a fault reaction that their own sensor never ends; since when the watchdog reaches them."""
         watchdog = world.robot.watchdog
-        rungs_s = RUNGS[Step.DISABLE_VOLTAGE].obey_s + RUNGS[Step.HEARTBEAT_WITHHELD].obey_s
         found_s = max(watchdog.motion_missing_s, world.robot.timeouts.feedback_s) + watchdog.drive_lag_s
-        self._reset_s = found_s + rungs_s + RESETS_S
-        self._least_mps2 = BRAKING_SHARE * world.robot.limits.deceleration_mps2
+        self._reset_s = found_s + LAST_RUNGS_S + RESETS_S
+        self._least_mps2 = LEAST_SHARE * world.robot.limits.deceleration_mps2
         self._missed_s = world.robot.timeouts.watchdog_s
 
     def step(self, stands: bool) -> None:

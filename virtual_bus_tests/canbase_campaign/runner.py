@@ -35,6 +35,9 @@ class Tally:
     virtual_s: float = 0.0
     processor_s: float = 0.0
     moved_m: float = 0.0
+    moving_s: float = 0.0
+    excused_s: dict[tuple[str, str], float] = field(default_factory=dict)
+    """By property and row of canbase_campaign.excuses: in motion, and held by that row alone."""
     broken_off: bool = False
     """By Ctrl-C: the other numbers are of what was done until then."""
 
@@ -50,6 +53,9 @@ class Tally:
         self.virtual_s += result.virtual_s
         self.processor_s += result.processor_s
         self.moved_m += result.moved_m
+        self.moving_s += result.moving_s
+        for name, row, seconds in result.excused_s:
+            self.excused_s[name, row] = self.excused_s.get((name, row), 0.0) + seconds
 
 
 def run(

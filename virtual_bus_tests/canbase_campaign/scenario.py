@@ -39,6 +39,9 @@ class Result:
     """How often the base drove in it, with a reset between."""
     goals: tuple[str, ...] = ()
     moved_m: float = 0.0
+    moving_s: float = 0.0
+    excused_s: tuple[tuple[str, str, float], ...] = ()
+    """Property, row of canbase_campaign.excuses, and seconds in motion in which it held by that row alone."""
     virtual_s: float = 0.0
     processor_s: float = field(default=0.0, compare=False)
 
@@ -158,6 +161,8 @@ class _Run:
             self._judge.lives,
             tuple(ends),
             self._world.drives.bench.base.path_m - self._moved_from_m,
+            self._judge.ledger.moving_s,
+            tuple((*key, seconds) for key, seconds in self._judge.ledger.excused_s.items()),
             self._world.clock.now_s - self._start,
             processor_s,
         )

@@ -21,6 +21,8 @@ class Strangers:
         """... since then, with pauses of SENT_S at most."""
         self.ordered_at = -math.inf
         """... or published to cmd_vel."""
+        self.ordered_on_bus_at = -math.inf
+        """A second master sent anything: commands, or a SYNC."""
         self.deaf_from = -math.inf
         """Since when the watchdog could not send, this time or the last one."""
         self._deaf = False
@@ -35,6 +37,8 @@ class Strangers:
             self.sent_at = intruder.moves_at
         if self.sent_at > before + SENT_S:
             self.sends_from = self.sent_at
+        if intruder.setpoints_mps or intruder.nmt or intruder.syncs:
+            self.ordered_on_bus_at = now_s
         if intruder.twist is not None:
             self.ordered_at = now_s
         self.deaf_from = now_s if deaf and not self._deaf else self.deaf_from

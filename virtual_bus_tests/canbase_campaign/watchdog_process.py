@@ -9,7 +9,7 @@ from canbase_campaign.clock import FINE, Pace
 from canbase_campaign.disk import WatchdogDisk
 from canbase_campaign.process import FRAMES_HELD, Process
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.watchdog import Watchdog
+from canbase_watchdog.watchdog import Answer, State, Watchdog
 
 
 class WatchdogProcess(Process):
@@ -34,6 +34,26 @@ class WatchdogProcess(Process):
     def is_deaf(self) -> bool:
         """Its adapter takes and gives no frames."""
         return self._failed_since < math.inf
+
+    @property
+    def tripped(self) -> bool:
+        """It reports a trip."""
+        return self.core.status.state is State.TRIPPED
+
+    @property
+    def watching(self) -> bool:
+        """It reports that it watches."""
+        return self.core.status.state is State.WATCHING
+
+    @property
+    def trip_cause(self) -> str:
+        """The name of what it has tripped on."""
+        return self.core.status.verdict.cause.name.lower()
+
+    @property
+    def reset_done(self) -> bool:
+        """It accepted the last reset."""
+        return self.core.status.reset[1] is Answer.DONE
 
     def begin(self) -> None:
         """A new core, which knows of a trip before by its record."""

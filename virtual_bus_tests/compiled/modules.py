@@ -51,8 +51,8 @@ HOT = {
         "plant.base plant.battery plant.encoder plant.motor world.bench"
     ),
     "canbase_campaign": (
-        "action_process can_bus clock disk process driver_process watchdog_process velocity_process drives envelope "
-        "fault goal_judge hands intruder lidar outside plan wishes reach "
+        "action_process allowance can_bus clock disk process driver_process watchdog_process velocity_process drives "
+        "envelope excuses fault goal_judge hands intruder lidar outside plan wishes reach "
         "scanner shown strangers motion_judge odometry_judge judge"
     ),
 }
