@@ -80,7 +80,7 @@ class Orders:
             self._sequence += 1
             twist = Twist(speed_mps, 0.0)
             self._socket.sendto(
-                lease_datagram(self._sequence, time.monotonic_ns(), twist, stops=False, estop=False), self._path
+                lease_datagram(self._sequence, time.monotonic_ns(), twist, brakes_hard=False), self._path
             )
         message = TwistStamped()
         message.twist.linear.x = speed_mps

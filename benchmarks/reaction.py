@@ -76,9 +76,7 @@ class FakeRobot:
         """Sends one; when it was sent (time.monotonic)."""
         self._sequence += 1
         twist = Twist(0.1 if self.speed else 0.0, 0.0)
-        self._socket.sendto(
-            lease_datagram(self._sequence, time.monotonic_ns(), twist, stops=False, estop=False), self._path
-        )
+        self._socket.sendto(lease_datagram(self._sequence, time.monotonic_ns(), twist, brakes_hard=False), self._path)
         return time.monotonic()
 
     def until(self, done: Callable[[can.Message | None], bool], leases: bool = True) -> float:

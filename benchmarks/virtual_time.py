@@ -129,7 +129,7 @@ class Chain:
     def _order(self) -> None:
         self._sequence += 1
         stamp_ns = round(self._clock.now_s * 1e9)
-        self._watchdog.on_lease(lease_datagram(self._sequence, stamp_ns, self._twist, stops=False, estop=False))
+        self._watchdog.on_lease(lease_datagram(self._sequence, stamp_ns, self._twist, brakes_hard=False))
         self._topics.publish("cmd_vel", self._twist)
         self._clock.after(COMMAND_S, self._order)
 

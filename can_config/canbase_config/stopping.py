@@ -13,6 +13,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from canbase_config.watchdog import STATE_PERIOD_S
+
 if TYPE_CHECKING:
     from canbase_config.drive import Drive
     from canbase_config.robot import Limits, Robot
@@ -138,6 +140,14 @@ def order_wait_s(robot: Robot) -> float:
     Its command timeout, two cycles, and the latency on the way to it.
     """
     return robot.timeouts.command_s + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
+
+
+def emergency_wait_s(robot: Robot) -> float:
+    """From "brakes hard" in a lease until the driver's setpoints fall so [s].
+
+    One state frame of the watchdog may be lost: the next one has it too. Then two cycles, and the latency on the way.
+    """
+    return STATE_PERIOD_S + CYCLES_TO_SETPOINT / robot.rates.control_hz + robot.watchdog.latency_s
 
 
 def jerk_adds_s(limits: Limits) -> float:

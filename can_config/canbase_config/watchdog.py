@@ -7,6 +7,8 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+STATE_PERIOD_S = 0.05
+"""From one state frame of the watchdog to the next, where nothing changes [s]."""
 HEARTBEATS_PER_TIMEOUT = 3
 """Driver and watchdog send their heartbeats this often in the time that the drives allow for one."""
 GUARDS_PER_TIMEOUT = 5
@@ -144,6 +146,10 @@ class WatchdogConfig:
     """An order that another one has replaced gets to the driver, and into its setpoints, within this time."""
     jerk_mps3: float = 100.0
     """The driver's limit; order_hold_s has what it adds to a change of speed."""
+    emergency_deceleration_mps2: float = 2.0
+    """With which the driver brakes while the leases have "brakes hard", not below deceleration_mps2 ..."""
+    emergency_wait_s: float = 0.12
+    """... from so long after the first of them on."""
     jolts: int = 5
     """This many velocity changes that no wheel can do show that a sensor is faulty."""
     braking_samples: int = 3
@@ -175,6 +181,11 @@ class WatchdogConfig:
     def heartbeat_period_s(self) -> float:
         """From one heartbeat of driver or watchdog to the next [s]."""
         return self.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT
+
+    @property
+    def emergency_share(self) -> float:
+        """An emergency stop takes this share of the time of an ordinary one without jerk limit, of turns too."""
+        return self.deceleration_mps2 / self.emergency_deceleration_mps2
 
     @property
     def guard_period_s(self) -> float:

@@ -157,10 +157,6 @@ class DriverCore:
         """Take a velocity command with its receive time. False, and counted: it was not finite."""
         return self._command.take(twist, received_at)
 
-    def on_emergency(self, brakes_hard: bool, received_at: float) -> None:
-        """Whether the safety filter requests the emergency deceleration, with the receive time of that."""
-        self._command.take_emergency(brakes_hard, received_at)
-
     def on_bus(self, problem: str, now_s: float, report: BusReport = HEALTHY) -> None:
         """The bus failed (a sentence), or works (empty); after a failure every node is booted again."""
         self._bus_report = report
@@ -265,7 +261,7 @@ class DriverCore:
             self._motion = MotionState.AT_REST
         else:
             target = self._command.target(now_s) if orders.drive is Drive.FOLLOW else Twist2D.ZERO
-            hard = self._command.brakes_hard(now_s)
+            hard = self._watchdog.brakes_hard(now_s)
             self._motion = self._limiter.step(self._motion, target, dt_s, emergency=hard)
         if self._bus_problem or not started:
             return []

@@ -13,9 +13,11 @@ from typing import Final
 
 from canbase_config.robot import Robot
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
+from canbase_driver.cia301.frame import Frame
 from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.velocity_command import Command
+from canbase_driver.supervision.watchdog_link import STATE_COB_ID, WatchdogLink
 from canbase_recording.recorded_inputs import RecordedInputs
 from canbase_runtime.driver_state import DriverState
 from canbase_watchdog import frames
@@ -109,21 +111,22 @@ def _followed(
 ) -> Iterator[tuple[Setpoints, MotionState]]:
     """The cycles in which the driver followed commands, each with what it would have ordered."""
     command, limiter = Command(robot.timeouts.command_s), Limiter(robot.limits, robot.base.track_m)
+    watchdog = WatchdogLink(robot.timeouts.watchdog_s)
     command.take(Twist2D.ZERO, -math.inf)  # what moves at the begin was released before it
     events = iter(_events(inputs))
     event, state, before_s = next(events, None), DriverState.ENABLED.name, math.nan
     motion: MotionState | None = None
     for cycle in cycles:
         while event is not None and event[0] <= cycle.at_s:
-            state = _take(command, event, state)
+            state = _take(command, watchdog, event, state)
             event = next(events, None)
         if not cycle.enabled or state != DriverState.ENABLED.name:
             motion, before_s = None, cycle.at_s
             continue
-        if motion is None:
+        if motion is None or not watchdog.reports:  # until its first state frame nobody knows how hard it brakes
             motion = _as_recorded(cycle, robot)
         else:
-            hard = command.brakes_hard(cycle.at_s)
+            hard = watchdog.brakes_hard(cycle.at_s)
             motion = limiter.step(motion, command.target(cycle.at_s), cycle.at_s - before_s, emergency=hard)
         before_s = cycle.at_s
         yield cycle, motion
@@ -135,18 +138,19 @@ Event = tuple[float, str, object]
 def _events(inputs: RecordedInputs) -> list[Event]:
     commands = [(each.at_s, "command", Twist2D(each.linear_mps, each.angular_radps)) for each in inputs.commands]
     states = [(each.at_s, "state", each.values.get("state")) for each in inputs.of("motor_driver/state")]
-    hard = [(each.at_s, "emergency", each.values.get("emergency")) for each in inputs.of("safety_filter/state")]
-    everything: list[Event] = [*commands, *states, *hard]
+    states_sent = (frame for frame in inputs.frames if frame.cob_id == STATE_COB_ID)
+    watchdog = [(frame.at_s, "watchdog", Frame(frame.cob_id, frame.data)) for frame in states_sent]
+    everything: list[Event] = [*commands, *states, *watchdog]
     return sorted(everything, key=lambda event: event[0])
 
 
-def _take(command: Command, event: Event, state: str) -> str:
+def _take(command: Command, watchdog: WatchdogLink, event: Event, state: str) -> str:
     """The state of the driver after it."""
     at_s, what, value = event
     if isinstance(value, Twist2D):
         command.take(value, at_s)
-    elif what == "emergency":
-        command.take_emergency(bool(value), at_s)
+    elif isinstance(value, Frame):
+        watchdog.on_frame(value, at_s)
     elif what == "state":
         if value == DriverState.ENABLED.name != state:
             command.await_zero()

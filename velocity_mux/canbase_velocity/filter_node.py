@@ -35,7 +35,7 @@ from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
 from canbase_velocity import messages
 from canbase_velocity.changes import DropTeller, changed_order, is_told
-from canbase_velocity.decision import Action, Decision
+from canbase_velocity.decision import Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_diagnostics import diagnostics
 from canbase_velocity.filter_state import SafetyFilter
@@ -298,8 +298,7 @@ class FilterNode(Node):
                 self._lease_sequence,
                 time.monotonic_ns(),
                 decision.twist,
-                stops=decision.action is Action.STOP,
-                estop=decision.cause.is_estop,
+                brakes_hard=decision.emergency,
             )
         )
         if report is not None:

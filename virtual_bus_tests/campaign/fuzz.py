@@ -106,7 +106,7 @@ def random_lease(random: Random, sequence: int, now_s: float) -> bytes:
     """A good lease, one with a byte changed, one cut short, or noise."""
     twist = Twist(random.uniform(-9.0, 9.0), random.choice((0.0, 1e300, -1e300)))
     stamp_ns = round((now_s + random.choice((0.0, 0.0, -1.0, 1.0))) * 1e9)
-    datagram = lease_datagram(sequence, stamp_ns, twist, stops=False, estop=False)
+    datagram = lease_datagram(sequence, stamp_ns, twist, brakes_hard=False)
     kind = random.randrange(4)
     if kind == 0:
         at = random.randrange(len(datagram))

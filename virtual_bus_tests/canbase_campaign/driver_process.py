@@ -14,7 +14,6 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
-from canbase_velocity.decision import Decision
 from canbase_velocity.twist import ZERO, Twist
 
 SETPOINTS = (0x200, 0x300)
@@ -54,7 +53,6 @@ class DriverProcess(Process):
         self._last_moving: dict[int, bytes] = {}
         self._moves = ZERO
         topics.subscribe("cmd_vel", self, self._on_command)
-        topics.subscribe("safety_filter/state", self, self._on_safety)
         self.begin()
 
     @property
@@ -120,9 +118,6 @@ class DriverProcess(Process):
             twist = self._moves
         self._moves = twist
         self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now_s)
-
-    def _on_safety(self, decision: Decision) -> None:
-        self.core.on_emergency(decision.emergency, self.clock.now_s)
 
     def _on_cycle(self) -> None:
         now_s = self.clock.now_s

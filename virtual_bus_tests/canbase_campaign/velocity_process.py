@@ -16,7 +16,7 @@ from canbase_config.state_age import STATE_PERIOD_S
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.clearance import Points
-from canbase_velocity.decision import Action, Decision
+from canbase_velocity.decision import Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.input_ring import Note, filter_entry, forget, mux_entry
@@ -179,8 +179,7 @@ class VelocityProcess(Process):
         self._filter_due, self.decision = now_s + self._period_s, decision
         self._sequence += 1
         self._stamp_ns = max(round(now_s * 1e9), self._stamp_ns + 1)  # no computer does two things in one nanosecond
-        stops = decision.action is Action.STOP
-        datagram = lease_datagram(self._sequence, self._stamp_ns, decision.twist, stops=stops, estop=False)
+        datagram = lease_datagram(self._sequence, self._stamp_ns, decision.twist, brakes_hard=decision.emergency)
         self._send_lease(datagram, decision.twist)
         self._topics.publish("cmd_vel", decision.twist)
         told = (decision.action, decision.cause, decision.emergency)

@@ -243,7 +243,7 @@ def test_every_order_has_its_lease_in_rising_sequence(chain: Chain) -> None:
     chain.estop.message = Bool(data=True)
     chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
     chain.drain()
-    assert chain.leases[-1][3:6] == (0.0, 0.0, 3)  # stops, emergency stop
+    assert chain.leases[-1][3:6] == (0.0, 0.0, 4)  # brakes hard
     assert chain.state.messages[-1].lease_sequence >= sequences[-1]
 
 

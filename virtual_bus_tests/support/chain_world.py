@@ -83,6 +83,10 @@ class World:
         self.start_watchdog()
         self.command: Twist2D | None = Twist2D.ZERO
         self.leases = True
+        self.brakes_hard = False
+        """The filter's leases have the flag "brakes hard", and zero."""
+        self.loses: Callable[[Frame], bool] = lambda frame: False
+        """Frames that the driver does not receive."""
         self.cable = True
         self.log: list[tuple[float, Frame]] = []
         """Every frame on the bus, with its time."""
@@ -264,14 +268,16 @@ class World:
         self._send(frames if self.cable else [])
 
     def _order(self) -> None:
-        if self.command is not None and self.command.is_finite:
+        if self.brakes_hard:
+            self._ordered = Twist2D.ZERO
+        elif self.command is not None and self.command.is_finite:
             self._ordered = self.command
         if self.driver is not None and self.command is not None:
             self.driver.on_command(self.command, self.now_s)
         if self.leases and self.watchdog is not None:
             self._sequence += 1
             ordered = Twist(self._ordered.linear_mps, self._ordered.angular_radps)
-            datagram = lease_datagram(self._sequence, round(self.now_s * 1e9), ordered, stops=False, estop=False)
+            datagram = lease_datagram(self._sequence, round(self.now_s * 1e9), ordered, brakes_hard=self.brakes_hard)
             self.watchdog.on_lease(datagram, None, self.now_s)
 
     def _send(self, frames: list[Frame]) -> None:
@@ -279,7 +285,7 @@ class World:
         while waiting:
             frame = waiting.pop(0)
             self.log.append((self.now_s, frame))
-            if self.driver is not None and self.cable and not frame.remote:
+            if self.driver is not None and self.cable and not frame.remote and not self.loses(frame):
                 waiting += self.driver.on_frame(frame, self.now_s)
             if self.watchdog is not None and not frame.remote:
                 self.watchdog.on_frame(frame.cob_id, frame.data, self.now_s)

@@ -94,7 +94,7 @@ class Surroundings(threading.Thread):
     def _lease(self, now_s: float) -> None:
         self._leases += 1
         ordered = Twist(self.ordered.linear_mps, self.ordered.angular_radps)
-        datagram = lease_datagram(self._leases, round(now_s * 1e9), ordered, stops=False, estop=False)
+        datagram = lease_datagram(self._leases, round(now_s * 1e9), ordered, brakes_hard=False)
         self._watchdog.on_lease(datagram, None, now_s)
 
     def _say(self, cob_id: int, data: bytes, *, extended: bool = False, remote: bool = False) -> None:

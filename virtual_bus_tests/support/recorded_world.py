@@ -33,7 +33,7 @@ class WorldRecorder:
         driver._member.send = self._before(driver._member.send, self._sent)
         world.bus.watch = self._on_wire
         self._tap("cmd_vel", self._on_command)
-        self._tap("safety_filter/state", self._on_filter)
+        world.topics.subscribe("safety_filter/state", driver, self._on_filter)
         world.topics.subscribe("velocity_mux/state", driver, self._on_mux)
         world.topics.watch = self._on_topic
 

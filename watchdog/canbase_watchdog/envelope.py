@@ -8,6 +8,8 @@ Rules
    bounds wait for each other: braking for a turn that has to end as well, a turn for braking, and also for a linear
    velocity that grows or is reversed.
 4. Before the watchdog started anything within the limits may have been ordered.
+5. From `emergency_wait_s` after "brakes hard" on, orders allow nothing: all bounds fall to zero together, with the
+   emergency deceleration, as the driver does then. Orders of before count no more, also when the base is at standstill.
 
 Pure; written apart from the driver's motion/limiter.py on purpose.
 """
@@ -40,6 +42,10 @@ class Peak:
         elif value != self._value:  # else it stays in force
             self._keep(self._value, now_s)
         self._value, self._end = value, until
+
+    def forget(self) -> None:
+        """Only the value in force is left."""
+        self._past.clear()
 
     def greatest(self, now_s: float) -> float:
         """The greatest value at the time `now_s`, which may not be before that of the last call."""
@@ -85,6 +91,12 @@ class Way:
         """Bring the most and the least of what was ordered up to date."""
         self.most, self.least = self._high.greatest(now_s), -self._low.greatest(now_s)
         self.level = max(self.level, self.most)
+
+    def cease(self) -> None:
+        """What was ordered is forgotten, and what is ordered allows nothing now. What is allowed is left, to fall."""
+        self._high.forget()
+        self._low.forget()
+        self.most = self.least = 0.0
 
     def fall(self, kept: float) -> None:
         """Keep this share of what is allowed beyond the most that was ordered."""
@@ -153,9 +165,31 @@ class Envelope:
         left.order(angular_radps, now_s, until)
         right.order(-angular_radps, now_s, until)
 
-    def advance(self, now_s: float) -> Bounds:
-        """The bounds at the monotonic time `now_s` [s], which may not be before that of the last call."""
+    def advance(self, now_s: float, hard_since: float = math.inf) -> Bounds:
+        """The bounds at the monotonic time `now_s` [s], which may not be before that of the last call.
+
+        `hard_since`: when "brakes hard" was received [s], infinity while it does not hold (rule 5).
+        """
         elapsed_s, self._at = now_s - self._at, now_s
+        hard_s = now_s - hard_since - self._config.emergency_wait_s
+        if hard_s >= 0.0:
+            self._fall_hard(min(elapsed_s, hard_s))
+        else:
+            self._follow_orders(elapsed_s, now_s)
+        forward, backward, left, right = self._ways
+        return Bounds(-backward.level, forward.level, -right.level, left.level)
+
+    def _fall_hard(self, elapsed_s: float) -> None:
+        config = self._config
+        forward, backward, left, right = self._ways
+        linear_s = max(forward.level, backward.level) / config.deceleration_mps2
+        angular_s = max(left.level, right.level) / config.angular_deceleration_radps2
+        kept = _kept(elapsed_s, max(linear_s, angular_s) * config.emergency_share)
+        for way in self._ways:
+            way.cease()
+            way.fall(kept)
+
+    def _follow_orders(self, elapsed_s: float, now_s: float) -> None:
         for way in self._ways:
             way.look(now_s)
         forward, backward, left, right = self._ways
@@ -165,7 +199,6 @@ class Envelope:
             backward.fall(_kept(elapsed_s, linear_s))
             left.fall(_kept(elapsed_s, angular_s))
             right.fall(_kept(elapsed_s, angular_s))
-        return Bounds(-backward.level, forward.level, -right.level, left.level)
 
     def _falling_s(self) -> tuple[float, float]:
         """How long the linear and the angular bounds still take to fall to what is ordered (rule 3)."""

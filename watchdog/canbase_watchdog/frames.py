@@ -108,8 +108,8 @@ class DriveState(enum.Enum):
     FAULT = (0x4F, 0x08)
 
 
-ARMED = 0x80
-"""Byte 2 of the state frame, above the rung."""
+BRAKES_HARD, ARMED = 0x40, 0x80
+"""Bits of byte 2 of the state frame, above the rung."""
 
 
 def is_powered(state: DriveState | None) -> bool:
@@ -254,14 +254,23 @@ def decode_guard_answer(data: bytes) -> tuple[bytes, int] | None:
 
 
 def state(
-    number: int, cause: int, rung: int, node_id: int, lease_age_s: float, reset: tuple[int, int], armed: bool = False
+    number: int,
+    cause: int,
+    rung: int,
+    node_id: int,
+    lease_age_s: float,
+    reset: tuple[int, int],
+    *,
+    armed: bool = False,
+    brakes_hard: bool = False,
 ) -> Frame:
     """The state frame. `lease_age_s` above 65.534 s (infinity too) is sent as unknown; `reset`: number, answer.
 
-    `armed`: the record on disk is LIVE.
+    `armed`: the record on disk is LIVE. `brakes_hard`: the driver has to brake with the emergency deceleration.
     """
     age_ms = int(max(lease_age_s, 0.0) * 1000.0) if lease_age_s < 65.535 else LEASE_AGE_UNKNOWN
-    return Frame(STATE, _STATE.pack(number, cause, rung | (ARMED if armed else 0), node_id, age_ms, *reset))
+    bits = (ARMED if armed else 0) | (BRAKES_HARD if brakes_hard else 0)
+    return Frame(STATE, _STATE.pack(number, cause, rung | bits, node_id, age_ms, *reset))
 
 
 def counters(refused: int, dropped: int, bus_errors: int, trips: int, gap_s: float) -> Frame:

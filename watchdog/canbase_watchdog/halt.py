@@ -4,6 +4,7 @@ The envelope (envelope.py) has to allow every order of the recent past, each for
 its change: 5 s and more with a low jerk_mps3. Once zero alone was leased for `order_wait_s` there is one order left,
 and the setpoints of that moment are known. From there all wheels go to zero together: along the S-curve that a driver
 makes which has only begun to brake, RECEIVED_S later at most. One that had begun before is below it.
+With "brakes hard" it is the straight line of the emergency deceleration, from `emergency_wait_s` after it on.
 
 Pure; written apart from the driver's motion/limiter.py on purpose.
 """
@@ -31,14 +32,16 @@ class _Ramp:
     setpoints_mps: tuple[float, ...]
     linear_mps: float
     straight_s: float
+    jerk_mps3: float
 
-    def share(self, jerk_mps3: float, after_s: float) -> float:
+    def share(self, after_s: float) -> float:
         """What is left of the setpoints at most."""
         if self.straight_s <= 0.0:
             return 0.0
         if self.linear_mps <= 0.0:
             return max(0.0, 1.0 - after_s / self.straight_s)
-        return 1.0 - _gained(self.linear_mps, self.linear_mps / self.straight_s, jerk_mps3, after_s) / self.linear_mps
+        gained_mps = _gained(self.linear_mps, self.linear_mps / self.straight_s, self.jerk_mps3, after_s)
+        return 1.0 - gained_mps / self.linear_mps
 
 
 class HaltWatch:
@@ -48,21 +51,28 @@ class HaltWatch:
         """`order_wait_s` from `config`: the longest way of an order to the driver."""
         self._config = config
         self._gap_s = max(LONGEST_STEP_S, SYNCS / config.control_hz)
-        self._since = math.inf
+        self._since = self._hard_since = math.inf
         self._sync_at = NEVER
         self._ramp: _Ramp | None = None
         self._after_s = 0.0
         self._bad = 0
 
-    def look(self, bus: BusView, lease: Lease | None, now_s: float) -> str:
-        """Which wheel's setpoint does not fall, for two SYNCs in a row, in words; empty: they do."""
+    def look(self, bus: BusView, lease: Lease | None, now_s: float, hard_since: float = math.inf) -> str:
+        """Which wheel's setpoint does not fall, for two SYNCs in a row, in words; empty: they do.
+
+        `hard_since`: when "brakes hard" was received [s], infinity while it does not hold.
+        """
         elapsed_s, is_new = bus.sync_at - self._sync_at, bus.sync_at != self._sync_at
         self._sync_at = bus.sync_at
-        if lease is None or lease.orders_motion:
-            self._since, self._ramp, self._bad = math.inf, None, 0
+        hard = hard_since < math.inf
+        ordered = lease is None or lease.orders_motion
+        if hard_since != self._hard_since or (ordered and not hard):
+            self._since, self._ramp, self._bad, self._hard_since = hard_since, None, 0, hard_since
+        if ordered and not hard:
             return ""
         self._since = min(self._since, now_s)
-        if not is_new or now_s < self._since + self._config.order_wait_s or not all(axis.enabled for axis in bus.axes):
+        wait_s = self._config.emergency_wait_s if hard else self._config.order_wait_s
+        if not is_new or now_s < self._since + wait_s or not all(axis.enabled for axis in bus.axes):
             return ""
         if self._ramp is None or self._left(self._ramp) > 0.0:  # at its end time is of no matter any more
             self._after_s += min(elapsed_s, LONGEST_STEP_S)
@@ -71,19 +81,22 @@ class HaltWatch:
         if not all(axis.setpoint_at == bus.sync_at for axis in bus.axes):
             return ""
         if self._ramp is None:
-            self._ramp, self._after_s = self._begin(bus.axes), 0.0
+            self._ramp, self._after_s = self._begin(bus.axes, hard), 0.0
         why = self._why(bus.axes, self._ramp)
         self._bad = self._bad + 1 if why else 0
         return why if self._bad >= SYNCS else ""
 
-    def _begin(self, axes: tuple[Axis, ...]) -> _Ramp:
+    def _begin(self, axes: tuple[Axis, ...], hard: bool) -> _Ramp:
         config, left, right = self._config, _mean(axes, "left"), _mean(axes, "right")
         linear_mps, angular_radps = abs(left + right) / 2.0, abs(right - left) / config.track_m
         straight_s = max(linear_mps / config.deceleration_mps2, angular_radps / config.angular_deceleration_radps2)
-        return _Ramp(tuple(axis.setpoint_mps for axis in axes), linear_mps, straight_s)
+        setpoints_mps = tuple(axis.setpoint_mps for axis in axes)
+        if hard:
+            return _Ramp(setpoints_mps, linear_mps, straight_s * config.emergency_share, math.inf)
+        return _Ramp(setpoints_mps, linear_mps, straight_s, config.jerk_mps3)
 
     def _left(self, ramp: _Ramp) -> float:
-        return ramp.share(self._config.jerk_mps3, max(0.0, self._after_s - RECEIVED_S))
+        return ramp.share(max(0.0, self._after_s - RECEIVED_S))
 
     def _why(self, axes: tuple[Axis, ...], ramp: _Ramp) -> str:
         share = self._left(ramp)

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 LAYOUT = struct.Struct("<4sQQddII")
 """Magic, sequence, CLOCK_MONOTONIC [ns], linear [m/s], angular [rad/s], flags, CRC-32 of all before it."""
 MAGIC = b"CBL1"
+BRAKES_HARD = 1 << 2
+"""Flag: the base has to brake with limits.emergency_deceleration_mps2, to standstill. The other bits mean nothing."""
 FUTURE_TOLERANCE_S = 0.005
 """A stamp that is so far ahead of the local clock is a lie: both processes read the same CLOCK_MONOTONIC."""
 
@@ -49,6 +51,11 @@ class Lease:
     def orders_motion(self) -> bool:
         """True when the filter orders any velocity that is not zero."""
         return self.linear_mps != 0.0 or self.angular_radps != 0.0
+
+    @property
+    def brakes_hard(self) -> bool:
+        """True when the base has to brake hard."""
+        return bool(self.flags & BRAKES_HARD)
 
 
 def parse(datagram: bytes) -> Lease | Refusal:

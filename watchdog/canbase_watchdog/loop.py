@@ -103,7 +103,7 @@ class Loop:
         stops = self._take_leases(now_s)
         expiry = self._watchdog.next_expiry(now_s)
         self._take_frames(now_s, min(expiry, now_s + TICK_S))
-        if stops or (now_s >= wake and time.monotonic() < expiry):
+        if stops or self._watchdog.owes_the_flag or (now_s >= wake and time.monotonic() < expiry):
             self._acted_at = now_s
             self._act(now_s)
             self._due = max(self._due, now_s - TICK_S) + TICK_S if now_s >= self._due else self._due

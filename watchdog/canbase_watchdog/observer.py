@@ -128,6 +128,7 @@ class Observer:
     def __init__(self, config: WatchdogConfig, now_s: float, *, echo: bool = True) -> None:
         """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis. `echo`:
         what this watchdog sends comes back to it."""
+        self._hard = False
         self._gap_s = config.feedback_timeout_s
         self._still_mps = config.motion_tolerance_mps
         self._records = {(drive.node_id, drive.axis): _Record(drive, config, now_s) for drive in config.drives}
@@ -179,6 +180,14 @@ class Observer:
         heartbeat_at, heard_at = self._heartbeat_at[node_id], self._heard_at[node_id]
         boot_up_at, configured_at = self._boot_up_at[node_id], self._configured_at[node_id]
         return Node(node_id, heartbeat_at, heard_at, boot_up_at, configured_at, self._operational[node_id])
+
+    def brake(self, hard: bool) -> None:
+        """Whether from now on each wheel has to follow setpoints that fall with the emergency deceleration."""
+        if hard is self._hard:
+            return
+        self._hard = hard
+        for record in self._in_order:
+            record.feedback.brake(hard)
 
     def trust(self) -> None:
         """A reset was accepted: the evidence against the sensors is dropped."""

@@ -1,10 +1,10 @@
 """Whether what one drive reports fits its setpoints and itself: three counts of bad samples in a row. No judgement.
 
 The wheel follows its setpoints: it may have the speed of any setpoint of the last `drive_lag_s` and less, and after
-that it falls with the configured deceleration; what it must have at least is motion_evidence.py. A wheel that something
-held back catches up when it comes free (overshoot.py). Encoder and velocity show the same travel, but for a small
-drift: a difference is forgotten over the way on which it did not grow, and very slowly with time, so that it is found
-at any speed (docs/decisions/0020).
+that it falls with the configured deceleration, under "brakes hard" with the emergency deceleration. What it must have
+at least is motion_evidence.py. A wheel that something held back catches up when it comes free (overshoot.py). Encoder
+and velocity show the same travel, but for a small drift: a difference is forgotten over the way on which it did not
+grow, and very slowly with time, so that it is found at any speed (docs/decisions/0020).
 """
 
 from __future__ import annotations
@@ -52,6 +52,7 @@ class Plausibility:
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now_s: float) -> None:
         """Before the monotonic time `now_s` [s] the wheel may have had any setpoint within the limits."""
         self._config = config
+        self._falls_mps2 = config.deceleration_mps2
         self._m_per_count = drive.m_per_count
         self._fixed_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
         self._jump_mps, self._jump_s = JUMP_FACTOR * config.max_wheel_mps, JUMP_CYCLES / config.control_hz
@@ -70,6 +71,11 @@ class Plausibility:
         self._counts_before: int | None = None
         self.last = Feedback()
         self.evidence = EvidenceWatch(drive, config, now_s)
+
+    def brake(self, hard: bool) -> None:
+        """Whether from now on the wheel has to follow setpoints that fall with the emergency deceleration."""
+        config = self._config
+        self._falls_mps2 = config.emergency_deceleration_mps2 if hard else config.deceleration_mps2
 
     def trust(self) -> None:
         """A reset was accepted: the differences of encoder and velocity are dropped."""
@@ -137,7 +143,7 @@ class Plausibility:
         )
 
     def _follow(self, elapsed_s: float, now_s: float) -> None:
-        fallen_mps = elapsed_s * self._config.deceleration_mps2
+        fallen_mps = elapsed_s * self._falls_mps2
         self._high = max(self._high - fallen_mps, self._forward.greatest(now_s), 0.0)
         self._low = max(self._low - fallen_mps, self._backward.greatest(now_s), 0.0)
 

@@ -6,13 +6,14 @@ import enum
 import math
 from dataclasses import dataclass, replace
 
-from canbase_config.watchdog import WatchdogConfig
+from canbase_config.watchdog import STATE_PERIOD_S, WatchdogConfig
 from canbase_watchdog import frames, policy
 from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.guarding import GuardRequests
 from canbase_watchdog.halt import HaltWatch
+from canbase_watchdog.hard_braking import HardBraking
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
@@ -24,7 +25,6 @@ from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict,
 from canbase_watchdog.twist import TwistWatch
 from canbase_watchdog.view import BusView, View
 
-STATE_PERIOD_S = 0.05
 COUNTERS_PERIOD_S = 0.5
 REPEATED_REQUEST_S = 1.0
 """A reset request with the number of the last one is a copy of it for this long, and a new one after [s]."""
@@ -61,6 +61,8 @@ class Status:
     """Some drive was not seen to stand: its sensor cannot be trusted, and its power is off for longer than it rolls."""
     armed: bool = False
     """The record on disk is LIVE, and frames of the driver arrive: a watchdog without reception never reports it."""
+    brakes_hard: bool = False
+    """The driver has to brake with the emergency deceleration, to standstill."""
     unproven: str = ""
     """While it is tripped: the joint that stopped as no wheel can, by what its sensors report; empty: none did."""
 
@@ -84,6 +86,7 @@ class Watchdog:
         self._pair = PairWatch(config)
         self._twist = TwistWatch(config, now_s)
         self._creep, self._halt = CreepWatch(config), HaltWatch(config)
+        self._hard = HardBraking()
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
         self._started_at = self._ticked_at = now_s
         self._bus_failed_since, self._bus_errors = math.inf, 0
@@ -118,7 +121,13 @@ class Watchdog:
         hears = self._ticked_at < self._observer.driver_at + self._config.drive_heartbeat_s
         armed = hears and self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
         unproven = self._unproven() if self._state is State.TRIPPED else ""
-        return Status(self._state, self._verdict, self._step, self._settled, self._reset, assumed, armed, unproven)
+        state, verdict, hard = self._state, self._verdict, self._hard.holds
+        return Status(state, verdict, self._step, self._settled, self._reset, assumed, armed, hard, unproven)
+
+    @property
+    def owes_the_flag(self) -> bool:
+        """The driver does not know yet that it has to brake hard: the next tick reports it."""
+        return self._hard.holds and not (self._told is not None and self._told.brakes_hard)
 
     @property
     def verdict(self) -> Verdict:
@@ -173,6 +182,7 @@ class Watchdog:
         lease = self._leases.last
         if refusal is None and lease is not None:
             self._envelope.order(lease.linear_mps, lease.angular_radps, now_s)
+            self._hard.on_lease(lease, now_s)
         return refusal
 
     def on_bus(self, failed_since: float, errors: int) -> None:
@@ -247,13 +257,17 @@ class Watchdog:
         return [frames.quick_stop(node_id, nodes.count(node_id), layout) for node_id, layout in layouts.items()]
 
     def _look(self, now_s: float) -> View:
-        bus, bounds = self._observer.look(), self._envelope.advance(now_s)
+        bus = self._observer.look()
+        self._hard.look(bus.axes)
+        hard_since = self._hard.since
+        self._observer.brake(self._hard.holds)
+        bounds = self._envelope.advance(now_s, hard_since)
         skew = self._pair.look(bus, bounds)
         gap_s = now_s - self._ticked_at
         leases, failed = self._leases, self._bus_failed_since
         twist = self._twist.look(bus, now_s)
         creep = self._creep.look(bus, bounds, now_s)
-        halt = self._halt.look(bus, leases.last, now_s)
+        halt = self._halt.look(bus, leases.last, now_s, hard_since)
         started_at, at = self._started_at, leases.valid_at
         return View(bus, bounds, started_at, leases.last, at, skew, twist, creep, gap_s, failed, halt)
 
@@ -321,7 +335,14 @@ class Watchdog:
         age_s = now_s - self._leases.valid_at
         verdict = status.verdict
         return frames.state(
-            status.state, verdict.cause, status.step, verdict.node_id, age_s, status.reset, status.armed
+            status.state,
+            verdict.cause,
+            status.step,
+            verdict.node_id,
+            age_s,
+            status.reset,
+            armed=status.armed,
+            brakes_hard=status.brakes_hard,
         )
 
     def _counters_frame(self) -> Frame:

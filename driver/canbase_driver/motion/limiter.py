@@ -1,12 +1,13 @@
 """Limits of speed, acceleration and jerk between the command and the wheels. No clock, no bus; a state goes in and out.
 
-Three rules, in the order of their weight:
+Four rules, in the order of their weight:
 1. The path's curvature (w / v) is kept: a target that is too fast is scaled as a whole, and the velocity moves along
    the straight line from the present to the target in the (v, w) plane. A stop follows the arc that the base is on.
 2. Braking is never put off: an acceleration away from a new target is dropped at once, a turn that grows is not waited
    for, and the jerk limit lengthens a stop by deceleration / jerk at most. A reversal brakes to an exact zero first.
 3. The target is reached exactly and never passed: when it comes too near for the jerk limit, the acceleration drops at
    once to what the jerk limit can still take back in time.
+4. An emergency stop that has begun goes on to zero, whatever is requested meanwhile.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ class MotionState:
     twist: Twist2D
     acceleration_mps2: float = 0.0
     """Rate of change of the linear velocity, with its sign [m/s²]."""
+    emergency: bool = False
+    """An emergency stop is under way."""
 
 
 MotionState.AT_REST = MotionState(Twist2D.ZERO)
@@ -81,6 +84,7 @@ class Limiter:
             raise ValueError(f"the current motion must be finite, not {current}")
         if not (math.isfinite(dt_s) and dt_s >= 0.0):
             raise ValueError(f"a time step must be finite and not negative, not {dt_s} s")
+        emergency = emergency or current.emergency
         goal = Twist2D.ZERO if emergency else _waypoint(current.twist, self.limit(target))
         if dt_s == 0.0:
             return current
@@ -104,7 +108,7 @@ class Limiter:
             done = gained_mps / distance_mps
         if done >= 1.0:
             return MotionState(goal)
-        return MotionState(_between(current.twist, goal, done), math.copysign(slope_mps2, change_mps))
+        return MotionState(_between(current.twist, goal, done), math.copysign(slope_mps2, change_mps), emergency)
 
     def _pace(self, current: Twist2D, goal: Twist2D, emergency: bool) -> tuple[Twist2D, float]:
         """Where the straight line from `current` ends, and the time for it without a jerk limit [s].

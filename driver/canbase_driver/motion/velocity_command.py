@@ -33,7 +33,6 @@ class Command:
         self._timeout_s = timeout_s
         self._twist = Twist2D.ZERO
         self._seen_zero = False
-        self._emergency_at = -math.inf
         self.received_at = -math.inf
         self.refused = 0
         """Commands that were not finite."""
@@ -46,14 +45,6 @@ class Command:
         self._twist, self.received_at = twist, received_at
         self._seen_zero = self._seen_zero or twist == Twist2D.ZERO
         return True
-
-    def take_emergency(self, brakes_hard: bool, received_at: float) -> None:
-        """Whether to brake with the emergency deceleration: until the filter revokes it, or its message is too old."""
-        self._emergency_at = received_at if brakes_hard else -math.inf
-
-    def brakes_hard(self, now_s: float) -> bool:
-        """The emergency deceleration was requested within the timeout. Whatever the command is, that means a stop."""
-        return now_s - self._emergency_at <= self._timeout_s
 
     def await_zero(self) -> None:
         """From now on nothing is followed until a zero has come: the operator must release the joystick once."""

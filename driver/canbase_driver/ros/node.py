@@ -122,9 +122,8 @@ class MotorDriverNode(ManagedNode):
         self._stops.on_command(twist, stamp.sec + stamp.nanosec * 1e-9, received_at)
 
     def _on_safety(self, message: SafetyState) -> None:
-        now_s = time.monotonic()
-        self._loop.emergency(message.emergency, now_s)
-        self._stops.on_filter(message, now_s)
+        """For the record of stops alone: how to brake comes with the command's lease, by the watchdog."""
+        self._stops.on_filter(message, time.monotonic())
 
     def _publish_status(self, snapshot: DriverSnapshot, stamp: object) -> None:
         previous = self._previous

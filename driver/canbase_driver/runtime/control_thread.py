@@ -76,10 +76,6 @@ class ControlLoop(threading.Thread):
         """Hand over a velocity command, from any thread."""
         self._inbox.put(lambda _now: self._core.on_command(twist, received_at))
 
-    def emergency(self, brakes_hard: bool, received_at: float) -> None:
-        """Hand over whether the safety filter requests the emergency deceleration, from any thread."""
-        self._inbox.put(lambda _now: self._core.on_emergency(brakes_hard, received_at))
-
     def request_shutdown(self) -> None:
         """Ramp to a stand, disable, end the thread."""
         self._inbox.put(lambda _now: self._core.request_shutdown())

@@ -22,8 +22,8 @@ LEASE_AGE_UNKNOWN = 0xFFFF
 RESET_KEY = b"RST"
 
 STARTING, WATCHING, TRIPPED = 0, 1, 2
-ARMED = 0x80
-"""Bit of byte 2, above the rung: its record on disk is LIVE."""
+BRAKES_HARD, ARMED = 0x40, 0x80
+"""Bits of byte 2, above the rung: brake with the emergency deceleration; its record on disk is LIVE."""
 
 CAUSES = {
     0: "none",
@@ -77,6 +77,8 @@ class WatchdogState:
     answer: int
     armed: bool = False
     """Its record on disk is LIVE: killed now, it comes back tripped."""
+    brakes_hard: bool = False
+    """The base has to brake with the emergency deceleration: the flag of the safety filter's leases."""
 
     @property
     def cause_text(self) -> str:
@@ -139,8 +141,9 @@ def parse_state(frame: Frame) -> WatchdogState | None:
     if frame.cob_id != STATE_COB_ID or len(frame.data) != STATE_LAYOUT.size:
         return None
     number, cause, rung, node_id, age_ms, answered, answer = STATE_LAYOUT.unpack(frame.data)
-    armed = bool(rung & ARMED)
-    state = WatchdogState(number, cause, rung & ~ARMED, node_id, age_ms, answered, answer, armed)
+    armed, hard = bool(rung & ARMED), bool(rung & BRAKES_HARD)
+    rung &= ~(ARMED | BRAKES_HARD)
+    state = WatchdogState(number, cause, rung, node_id, age_ms, answered, answer, armed, hard)
     return state if state.state in (STARTING, WATCHING, TRIPPED) else None
 
 
@@ -191,6 +194,11 @@ class WatchdogLink:
             return math.nan
         return self._state.lease_age_ms / 1000.0
 
+    @property
+    def reports(self) -> bool:
+        """A state frame of it was received."""
+        return self._state is not None
+
     def age_s(self, now_s: float) -> float:
         """Seconds since the last state frame; NaN: none yet."""
         return now_s - self._received_s if self._state else math.nan
@@ -225,6 +233,10 @@ class WatchdogLink:
         if self._state.state == STARTING:
             return WatchdogView.MISSING, "still starting"
         return WatchdogView.OK, ""
+
+    def brakes_hard(self, now_s: float) -> bool:
+        """Whether the base has to brake hard. Without a recent state frame nobody knows, and that means hard."""
+        return self._state is None or self._state.brakes_hard or now_s - self._received_s > self._timeout_s
 
     @property
     def about_drive(self) -> bool:

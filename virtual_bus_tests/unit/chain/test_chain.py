@@ -154,29 +154,6 @@ def test_a_command_that_ends_counts_for_200_ms_then_the_base_ramps_down_stays_en
     assert world.truth.linear_mps == pytest.approx(0.3, abs=0.005)
 
 
-def test_an_emergency_brakes_with_the_emergency_deceleration_and_trips_nothing(world: World) -> None:
-    """0.3 m/s: 0.3 s with 1 m/s² and its jerk limit, 0.15 s with 2 m/s²; the filter says it ten times a second."""
-    world.drive()
-    world.command = Twist2D.ZERO
-    for _ in range(2):
-        world.core.on_emergency(True, world.now_s)
-        world.run(0.1)
-    assert world.targets_mps()[-4:] == [(0.0, 0.0)] * 4
-    assert world.truth.linear_mps < 0.1
-    world.core.on_emergency(False, world.now_s)
-    world.command = FORWARD
-    world.run(0.8)
-    assert world.core.state is DriverState.ENABLED
-    assert world.truth.linear_mps == pytest.approx(0.3, abs=0.005)
-
-
-def test_without_an_emergency_it_is_not_yet_at_zero_then(world: World) -> None:
-    world.drive()
-    world.command = Twist2D.ZERO
-    world.run(0.2)
-    assert world.targets_mps()[-1][0] > 0.05
-
-
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_is_refused_and_counted_and_does_not_refresh_the_command(world: World, bad: float) -> None:
     world.drive()

@@ -33,15 +33,12 @@ NEEDED = {name: {"velocity_unit": "0.001rev/s"} for name in ("nanotec", "dryve_d
 """What profiles do not know."""
 
 
-@pytest.mark.parametrize(
-    ("linear", "angular", "stops", "estop", "flags"),
-    [(0.0, 0.0, True, False, 1), (0.25, -1.5, False, False, 0), (-1e-9, 1e9, True, True, 3)],
-)
-def test_the_watchdog_reads_the_lease_that_the_filter_writes(
-    linear: float, angular: float, stops: bool, estop: bool, flags: int
-) -> None:
-    datagram = lease_datagram(2**40, 2**50, Twist(linear, angular), stops=stops, estop=estop)
-    assert lease.parse(datagram) == lease.Lease(2**40, 2**50, linear, angular, flags)
+@pytest.mark.parametrize(("linear", "angular", "hard"), [(0.0, 0.0, True), (0.25, -1.5, False), (-1e-9, 1e9, True)])
+def test_the_watchdog_reads_the_lease_that_the_filter_writes(linear: float, angular: float, hard: bool) -> None:
+    read = lease.parse(lease_datagram(2**40, 2**50, Twist(linear, angular), brakes_hard=hard))
+    assert isinstance(read, lease.Lease)
+    assert (read.sequence, read.stamp_ns, read.linear_mps, read.angular_radps) == (2**40, 2**50, linear, angular)
+    assert read.brakes_hard is hard
 
 
 @pytest.mark.parametrize("state", list(State))
@@ -49,6 +46,16 @@ def test_the_driver_reads_the_state_frame_that_the_watchdog_writes(state: State)
     ours = frames.state(state, TripCause.DRIVE_SILENT, Step.PRE_OPERATIONAL, 7, 0.251, (9, Answer.CAUSE_STANDS))
     read = watchdog_link.parse_state(DriverFrame(ours.cob_id, ours.data))
     assert read == watchdog_link.WatchdogState(int(state), 3, 2, 7, 251, 9, 2)
+
+
+@pytest.mark.parametrize("step", list(Step))
+@pytest.mark.parametrize("armed", [False, True])
+@pytest.mark.parametrize("hard", [False, True])
+def test_the_bits_beside_the_rung_of_a_state_frame_are_read_apart(step: Step, armed: bool, hard: bool) -> None:
+    ours = frames.state(State.WATCHING, 0, step, 0, 0.0, (0, 0), armed=armed, brakes_hard=hard)
+    read = watchdog_link.parse_state(DriverFrame(ours.cob_id, ours.data))
+    assert read is not None
+    assert (read.rung, read.armed, read.brakes_hard) == (int(step), armed, hard)
 
 
 def test_states_and_answers_have_the_same_numbers() -> None:

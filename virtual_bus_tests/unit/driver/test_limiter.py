@@ -253,3 +253,14 @@ def test_an_emergency_stop_keeps_the_circle_and_ignores_the_target() -> None:
 def test_the_smallest_changes_arrive_exactly(speed_mps: float, distance_mps: float) -> None:
     target = Twist2D(speed_mps - distance_mps, 0.0)
     assert steps_until(LIMITER, MotionState(Twist2D(speed_mps, 0.0)), target, 10) <= 3
+
+
+def test_an_emergency_stop_that_has_begun_goes_on_to_zero_whatever_is_requested_meanwhile() -> None:
+    begun = LIMITER.step(MotionState(Twist2D(0.8, 0.4)), Twist2D(1.0, 0.0), DT_S, emergency=True)
+    assert begun.emergency
+    states = [begun, *drive(LIMITER, begun, Twist2D(1.0, 0.0), 0.6)]
+    zero = next(at for at, state in enumerate(states) if state.twist == Twist2D.ZERO)
+    once = drive(LIMITER, begun, Twist2D.ZERO, 0.6, emergency=True)
+    assert states[1 : zero + 1] == once[:zero]
+    assert states[zero] == MotionState.AT_REST
+    assert states[zero + 1].twist.linear_mps > 0.0

@@ -51,16 +51,6 @@ def test_a_command_counts_for_its_timeout(now_s: float, fresh: bool) -> None:
     assert (made.motion(now_s) == "cmd_vel orders 0.300 m/s, 0.100 rad/s") is fresh
 
 
-@pytest.mark.parametrize(("now_s", "hard"), [(10.0, True), (10.2, True), (10.201, False)])
-def test_the_emergency_deceleration_counts_for_the_timeout_or_until_it_is_taken_back(now_s: float, hard: bool) -> None:
-    made = Command(timeout_s=0.2)
-    assert not made.brakes_hard(10.0)
-    made.take_emergency(True, 10.0)
-    assert made.brakes_hard(now_s) is hard
-    made.take_emergency(False, 10.0)
-    assert not made.brakes_hard(now_s)
-
-
 def test_a_zero_is_no_motion() -> None:
     assert command(Twist2D.ZERO).motion(10.0) == ""
 

@@ -134,3 +134,20 @@ def test_the_age_of_the_lease_and_the_rung(data: str, age_s: float, rung: int) -
     assert heard.lease_age_s == pytest.approx(age_s, nan_ok=True)
     assert heard.rung == rung
     assert math.isnan(WatchdogLink(0.2).lease_age_s)
+
+
+@pytest.mark.parametrize(("data", "now_s", "hard"), [
+    (WATCHING, 10.0, False),
+    (WATCHING, 10.2, False),
+    (WATCHING, 10.201, True),  # nobody knows
+    ("01 00 40 00 14 00 00 00", 10.0, True),
+    ("01 00 c0 00 14 00 00 00", 10.0, True),
+    ("01 00 80 00 14 00 00 00", 10.0, False),
+    ("00 00 40 00 14 00 00 00", 10.0, True),  # still starting
+    ("02 03 41 02 ff ff 00 00", 10.0, True),
+])  # fmt: skip
+def test_whether_to_brake_hard_is_in_its_state_frame_and_unknown_means_hard(
+    data: str, now_s: float, hard: bool
+) -> None:
+    assert link(data).brakes_hard(now_s) is hard
+    assert WatchdogLink(timeout_s=0.2).brakes_hard(now_s)

@@ -16,7 +16,7 @@ from canbase_velocity.lease import lease_datagram
 from canbase_velocity.lease_sender import LeaseSender
 from canbase_velocity.twist import ZERO, Twist
 
-LEASE = lease_datagram(1, 2, Twist(0.5, -1.0), stops=False, estop=False)
+LEASE = lease_datagram(1, 2, Twist(0.5, -1.0), brakes_hard=False)
 
 
 @pytest.fixture
@@ -49,20 +49,20 @@ def test_the_bytes_of_a_lease() -> None:
     assert LEASE[40:] == struct.pack("<I", zlib.crc32(LEASE[:40]))
 
 
-@pytest.mark.parametrize(("stops", "estop", "flags"), [(False, False, 0), (True, False, 1), (True, True, 3)])
-def test_the_flags_of_a_lease(stops: bool, estop: bool, flags: int) -> None:
-    assert lease_datagram(1, 0, ZERO, stops=stops, estop=estop)[36:40] == bytes([flags, 0, 0, 0])
+@pytest.mark.parametrize(("brakes_hard", "flags"), [(False, 0), (True, 4)])
+def test_the_flags_of_a_lease(brakes_hard: bool, flags: int) -> None:
+    assert lease_datagram(1, 0, ZERO, brakes_hard=brakes_hard)[36:40] == bytes([flags, 0, 0, 0])
 
 
 @pytest.mark.parametrize("twist", [Twist(math.nan, 0.0), Twist(0.0, math.inf), Twist(-math.inf, 0.0)])
 def test_a_velocity_that_is_not_finite_is_never_leased(twist: Twist) -> None:
     with pytest.raises(ValueError, match="finite"):
-        lease_datagram(1, 0, twist, stops=False, estop=False)
+        lease_datagram(1, 0, twist, brakes_hard=False)
 
 
 def test_the_sequence_starts_at_1() -> None:
     with pytest.raises(ValueError, match="starts at 1"):
-        lease_datagram(0, 0, ZERO, stops=True, estop=False)
+        lease_datagram(0, 0, ZERO, brakes_hard=True)
 
 
 def test_a_lease_arrives(sender: LeaseSender, watchdog: socket.socket) -> None:

@@ -318,3 +318,56 @@ def test_at_the_very_limit_they_go_together(left: float, right: float) -> None:
 def test_two_wheels_together(left: float, right: float, words: str) -> None:
     bounds = Bounds(-0.1, 0.5, -0.5, 1.0)
     assert bounds.pair(left, right, track_m=0.4, tolerance_mps=0.05 + 1e-9) == words
+
+
+# --- brakes hard: 0.12 s, then with the emergency deceleration (2 m/s²)
+
+
+def hard_bounds(line: Timeline, seconds: float, since: float, linear: float = 0.0) -> Bounds:
+    """Leases every 20 ms with "brakes hard" since `since`, in steps of 5 ms; the bounds at its end."""
+    for _ in range(round(seconds / 0.005)):
+        if line.ms % 20 == 0:
+            line.envelope.order(linear, 0.0, LONG_AGO + 0.001 + line.t)
+        line.ms += 5
+        line.bounds = line.envelope.advance(LONG_AGO + 0.001 + line.t, since)
+    return line.bounds
+
+
+@pytest.mark.parametrize(
+    ("after_s", "high_mps"),
+    [(0.005, 0.8), (0.115, 0.8), (0.12, 0.8), (0.125, 0.79), (0.13, 0.78), (0.32, 0.4), (0.515, 0.01), (0.52, 0.0)],
+)
+@pytest.mark.parametrize("linear", [0.0, 0.8, -0.8])
+def test_brakes_hard_ends_what_is_allowed_whatever_is_ordered(linear: float, after_s: float, high_mps: float) -> None:
+    line = Timeline(order_hold_s=5.0, emergency_wait_s=0.12, emergency_deceleration_mps2=2.0)
+    line.order(0.8, 0.0, 1.0)
+    since = LONG_AGO + 0.001 + line.t
+    bounds = hard_bounds(line, after_s, since, linear)
+    assert bounds.linear_high == pytest.approx(high_mps, abs=1e-6)
+    assert bounds.linear_low == pytest.approx(-high_mps if linear < 0.0 else 0.0, abs=1e-6)
+
+
+def test_a_turn_falls_with_the_way_and_in_half_the_time() -> None:
+    """0.5 m/s and 4 rad/s: 0.8 s by the turn with 5 rad/s², in an emergency 0.4 s, both of them."""
+    line = Timeline(emergency_wait_s=0.0, emergency_deceleration_mps2=2.0)
+    line.order(0.5, -4.0, 1.0)
+    since = LONG_AGO + 0.001 + line.t
+    for after_s, share in ((0.1, 0.75), (0.2, 0.25), (0.1, 0.0)):
+        bounds = hard_bounds(line, after_s, since)
+        assert numbers(bounds) == pytest.approx((0.0, 0.5 * share, -4.0 * share, 0.0), abs=1e-6)
+
+
+def test_after_it_only_orders_from_then_on_count() -> None:
+    line = Timeline(order_hold_s=5.0, emergency_wait_s=0.12, emergency_deceleration_mps2=2.0)
+    line.order(0.8, 0.0, 1.0)
+    hard_bounds(line, 0.6, LONG_AGO + 0.001 + line.t)
+    assert numbers(line.order(0.0, 0.0, 0.1)) == NOTHING
+    assert line.order(0.3, 0.0, 0.1).linear_high == pytest.approx(0.3)
+
+
+def test_before_it_counts_orders_do() -> None:
+    """It ended within the 0.12 s: nothing has fallen."""
+    line = Timeline(order_hold_s=0.35, emergency_wait_s=0.12, emergency_deceleration_mps2=2.0)
+    line.order(0.8, 0.0, 1.0)
+    hard_bounds(line, 0.1, LONG_AGO + 0.001 + line.t)
+    assert line.order(0.0, 0.0, 0.2).linear_high == pytest.approx(0.8)

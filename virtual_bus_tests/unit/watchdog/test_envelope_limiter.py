@@ -12,7 +12,7 @@ import pytest
 from canbase_config.robot import Limits
 from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
-from canbase_watchdog.envelope import Envelope
+from canbase_watchdog.envelope import Bounds, Envelope
 from support.watchdog_story import config
 
 CONFIG = config()
@@ -73,3 +73,40 @@ def test_the_drivers_limiter_stays_inside(seed: int) -> None:
             low, high = bounds.wheel(arm_m)
             worst = max(worst, low - speed, speed - high)
     assert worst < 0.005
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_an_emergency_stop_of_the_drivers_limiter_stays_inside_from_any_motion(seed: int) -> None:
+    """It begins at the last moment, and follows the order of before until then; a lease without the flag, and with
+    motion, comes in between. Then the bounds are zero: as soon as the setpoints are."""
+    random = Random(seed)
+    limits, track_m = some_limits(random), random.choice((0.2, 0.5, 1.0))
+    wait_s = random.choice((0.05, 0.12, 0.4))
+    told = limits.model_dump(exclude={"jerk_mps3"}) | {"track_m": track_m, "emergency_wait_s": wait_s}
+    envelope = Envelope(replace(CONFIG, **told, order_hold_s=5.0), -BEFORE_S)
+    limiter, motion, order = Limiter(limits, track_m), MotionState.AT_REST, Twist2D.ZERO
+    steps = random.choice((20, 150, 700))
+    for cycle in range(steps):
+        if cycle % 100 == 0:
+            order, _ = some_order(random, limits, order)
+        envelope.order(order.linear_mps, order.angular_radps, cycle * CYCLE_S)
+        motion = limiter.step(motion, order, CYCLE_S)
+        envelope.advance(cycle * CYCLE_S)
+    since, worst, at_rest_s = steps * CYCLE_S, 0.0, math.inf
+    later = random.choice((Twist2D.ZERO, order))
+    for cycle in range(steps, steps + 3000):
+        t = cycle * CYCLE_S
+        envelope.order(later.linear_mps, later.angular_radps, t)
+        motion = limiter.step(motion, order, CYCLE_S, emergency=t > since + wait_s - 1e-9)
+        bounds = envelope.advance(t, since)
+        for arm_m, speed in zip((-track_m / 2, track_m / 2), wheel_speeds(motion.twist, track_m), strict=True):
+            low, high = bounds.wheel(arm_m)
+            worst = max(worst, low - speed, speed - high)
+        if bounds == Bounds(0.0, 0.0, 0.0, 0.0):
+            at_rest_s = min(at_rest_s, t)
+    longest_s = max(
+        limits.linear_mps / limits.deceleration_mps2, limits.angular_radps / limits.angular_deceleration_radps2
+    )
+    longest_s *= limits.deceleration_mps2 / limits.emergency_deceleration_mps2
+    assert worst < 0.005
+    assert at_rest_s <= since + wait_s + longest_s + 2 * CYCLE_S

@@ -143,6 +143,52 @@ def test_the_drivers_own_limiter_is_never_found(seed: int) -> None:
             break
 
 
+# "Brakes hard": 0.12 s, the setpoints of that moment, 0.1 s, then 2 m/s² in a straight line
+
+
+def hard_found_s(wheels: Callable[[float], tuple[float, float]], lease: Lease = ZERO, before_s: float = 0.0) -> float:
+    """As found_s, by seconds since "brakes hard"; zero was leased for `before_s` before."""
+    watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=1.0, emergency_wait_s=0.12))
+    begin = round(before_s / CYCLE_S)
+    for i in range(-begin, 200):
+        at = 5.0 + i * CYCLE_S
+        if watch.look(bus(wheels(i * CYCLE_S), at), ZERO if i < 0 else lease, at, 5.0 if i >= 0 else inf):
+            return i * CYCLE_S
+    return inf
+
+
+@pytest.mark.parametrize("lease", [ZERO, MOVE])
+@pytest.mark.parametrize(("mps", "lost_s"), [(0.8, 0.0155), (-0.3, 0.0155), (0.032, 0.016)])
+def test_a_driver_that_goes_on_under_brakes_hard_is_found_whatever_is_leased(
+    lease: Lease, mps: float, lost_s: float
+) -> None:
+    assert hard_found_s(lambda t: (mps, mps), lease) == pytest.approx(0.12 + RECEIVED_S + lost_s, abs=0.035)
+
+
+@pytest.mark.parametrize(("mps2", "is_found"), [(2.0, False), (1.6, False), (1.3, True), (1.0, True), (0.5, True)])
+def test_a_driver_that_brakes_too_softly_is_found(mps2: float, is_found: bool) -> None:
+    """0.8 m/s: with the 0.1 s of a late SYNC and the tolerance it has to be above 0.8 − 2.0 (t − 0.1) + 0.031."""
+    after_s = hard_found_s(lambda t: (max(0.0, 0.8 - mps2 * t),) * 2)
+    assert (after_s < inf) is is_found
+    if is_found:
+        assert 0.12 + RECEIVED_S < after_s < 0.8
+
+
+def test_zero_that_was_leased_before_makes_no_ramp_of_brakes_hard() -> None:
+    """0.5 s of a gentle ramp, then the hard one from the setpoints of 0.12 s later."""
+    gentle, hard = lambda t: 0.8 - 0.4 * (t + 0.5), lambda t: 0.552 - 2.0 * (t - 0.12)
+    assert hard_found_s(lambda t: (max(0.0, gentle(t) if t < 0.12 else hard(t)),) * 2, before_s=0.5) == inf
+    assert hard_found_s(lambda t: (max(0.0, gentle(t)),) * 2, before_s=0.5) < 0.4
+
+
+def test_the_end_of_brakes_hard_begins_anew() -> None:
+    watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=1000.0, emergency_wait_s=0.0))
+    for i in range(5):
+        watch.look(bus((0.0, 0.0), 5.0 + i / 100), ZERO, 5.0 + i / 100, 5.0)
+    for i in range(5, 100):
+        assert watch.look(bus((0.3, 0.3), 5.0 + i / 100), MOVE, 5.0 + i / 100) == ""
+
+
 def test_the_policy_trips_with_it() -> None:
     view = replace(well(), halt="left is ordered 0.8 m/s")
     verdict = decide(view, CONFIG, NOW)

@@ -113,7 +113,7 @@ def somebody_publishes_straight_to_cmd_vel(world: World) -> EachStep:
     def zero_leases() -> None:
         nonlocal sequence
         sequence += 1
-        zero = lease_datagram(sequence, round(world.now_s * 1e9), Twist(0.0, 0.0), stops=False, estop=False)
+        zero = lease_datagram(sequence, round(world.now_s * 1e9), Twist(0.0, 0.0), brakes_hard=False)
         assert world.watchdog is not None
         world.watchdog.on_lease(zero, None, world.now_s)
 
