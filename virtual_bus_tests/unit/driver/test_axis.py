@@ -7,9 +7,11 @@ import math
 import pytest
 
 from canbase_driver.cia301.pdo import NodeLayout, pack_setpoint
-from canbase_driver.cia402 import DriveState, PowerGoal, next_controlword
+from canbase_driver.cia402 import DriveState, PowerGoal, decode_statusword, next_controlword
 from canbase_driver.drives.axis import Axis
+from canbase_driver.motion.limiter import Limiter
 from support.chain_world import BITS_PER_MPS, bench_robot
+from support.crews import robot_with
 
 ENABLED, READY, UNKNOWN = 0x0637, 0x0631, 0x0000
 COUNTS_PER_M = 4096 * 20 / (2.0 * math.pi * 0.1)
@@ -213,3 +215,161 @@ def test_a_speed_of_less_than_half_a_bit_is_no_order() -> None:
     left.setpoint(PowerGoal.ON, 0.51 * bit_mps, 0x0F)
     assert left.target_mps == 0.51 * bit_mps
     assert not left.rests(0.0)
+
+
+def test_the_left_and_the_right_axis() -> None:
+    assert [axis(number).is_left for number in (0, 1)] == [True, False]
+
+
+def test_torque_is_assumed_until_a_statusword_denies_it() -> None:
+    left = axis()
+    assert left.has_torque
+    left.on_status(status(READY, 0), 10.0)
+    assert not left.has_torque
+    left.on_status(status(ENABLED, 0), 10.01)
+    assert left.has_torque
+    left.on_status(status(READY, 0), 10.02)
+    left.forget()
+    assert left.has_torque
+    left.on_status(status(0x006E, 0), 10.03)  # a state that CiA 402 does not have
+    assert left.state is None
+    assert left.has_torque
+
+
+FASTEST_MPS = Limiter(bench_robot().limits, bench_robot().base.track_m).wheel_mps
+
+
+@pytest.mark.parametrize(
+    ("cycles", "gap_s"), [(1, 0.001), (1, 0.01), (2, 0.02), (100, 1.0), (6000, 60.0), (6000, 90.0)]
+)
+def test_an_encoder_may_step_three_times_as_far_as_the_fastest_wheel_gets(cycles: int, gap_s: float) -> None:
+    """Of a gap of more than a minute, a minute counts."""
+    most_m = 3.0 * FASTEST_MPS * 0.01 * cycles
+    for step_m, taken in ((0.99 * most_m, True), (1.01 * most_m, False)):
+        left = axis()
+        left.on_status(status(ENABLED, 0), 10.0)
+        left.on_status(status(ENABLED, round(step_m * COUNTS_PER_M)), 10.0 + gap_s)
+        assert left.travel.travel_m == pytest.approx(step_m if taken else 0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(("counts", "taken"), [(1, True), (2, False)])
+def test_a_coarse_encoder_may_step_one_count_in_a_cycle(counts: int, taken: bool) -> None:
+    robot = bench_robot()
+    drive = robot.drives[0].model_copy(update={"counts_per_motor_rev": 1})
+    left = Axis(drive, NodeLayout(1, (0,)), robot)
+    left.on_status(status(ENABLED, 0), 10.0)
+    left.on_status(status(ENABLED, counts), 10.01)
+    assert (left.travel.travel_m > 0.0) is taken
+
+
+@pytest.mark.parametrize(("share", "due"), [(0.74, False), (0.76, True)])
+def test_a_wheel_must_be_released_after_three_quarters_of_what_the_watchdog_waits(share: float, due: bool) -> None:
+    left, impulse_s = axis(), bench_robot().watchdog.stand_impulse_s
+    left.target_mps = 0.1
+    for n in range(1 + round(share * impulse_s / 0.001)):
+        left.on_status(status(ENABLED, 0), n * 0.001)
+        left.on_velocity(velocity(0), n * 0.001)
+    assert left.push.must_let_go is due
+
+
+def test_a_wheel_that_nothing_was_ordered_of_owes_no_release() -> None:
+    left = axis()
+    left.target_mps = 0.1
+    for n in range(500):  # ready to switch on: its setpoint is no order
+        left.on_status(status(READY, 0), n * 0.01)
+        left.on_velocity(velocity(0), n * 0.01)
+    for n in range(500, 1000):
+        left.target_mps = 0.0
+        left.on_status(status(ENABLED, 0), n * 0.01)
+        left.on_velocity(velocity(0), n * 0.01)
+    assert not left.push.must_let_go
+    assert left.stillness.doubt == ""
+
+
+def test_losses_are_restarts_and_jumps_together() -> None:
+    left = axis()
+    left.on_status(status(ENABLED, 0), 10.0)
+    for n in range(1, 4):
+        left.on_status(status(ENABLED, 10**6 + n), 10.0 + 0.01 * n)
+    assert left.losses == 1
+    left.forget()
+    assert left.losses == 2
+
+
+def test_values_count_up_to_their_very_last_moment() -> None:
+    left, feedback_s = axis(), bench_robot().timeouts.feedback_s
+    drives(left, 0.0, 0.0, -0.01)
+    drives(left, 0.0, 0.0, 0.0)
+    assert left.stands(feedback_s)
+    assert left.has_fresh_sample(feedback_s)
+    assert not left.stands(math.nextafter(feedback_s, 1.0))
+    assert not left.has_fresh_sample(math.nextafter(feedback_s, 1.0))
+
+
+NOISY_MPS = 0.9 * bench_robot().watchdog.motion_tolerance_mps
+"""Faster than standstill: only an encoder that stays where it is for 0.2 s shows that the wheel is at standstill."""
+
+
+@pytest.mark.parametrize(
+    ("gap", "stands"), [("none", True), ("of the timeout", True), ("longer", False), ("forgotten", False)]
+)
+def test_after_a_gap_standstill_needs_its_time_again(gap: str, stands: bool) -> None:
+    left, feedback_s = axis(), bench_robot().timeouts.feedback_s
+    for n in range(25):
+        drives(left, 0.0, NOISY_MPS, -0.24 + 0.01 * n)
+    assert left.stands(0.0)
+    if gap == "forgotten":
+        left.forget()
+    after_s = {"of the timeout": feedback_s, "longer": math.nextafter(feedback_s, 1.0)}.get(gap, 0.01)
+    drives(left, 0.0, NOISY_MPS, after_s)
+    assert left.stands(after_s) is stands
+
+
+# 10.00 s: 0.3 m/s, then the drive is lost ── its velocity is read by SDO
+@pytest.mark.parametrize(
+    ("speed_mps", "after_s", "trusted"),
+    [(0.3, 0.02, True), (0.0, 0.02, False), (0.0, 5.0, True), (-0.3, 0.02, True), (0.6, 0.02, True)],
+)
+def test_a_velocity_read_after_a_restart_is_doubted_where_no_wheel_slows_down_so(
+    speed_mps: float, after_s: float, trusted: bool
+) -> None:
+    left = axis()
+    drives(left, 0.0, 0.3, 10.0)
+    left.forget()
+    left.forget()  # what was lost before stays known
+    left.on_speed(round(speed_mps * BITS_PER_MPS), 10.0 + after_s)
+    assert left.velocity_mps == pytest.approx(speed_mps, abs=1e-4)
+    assert (left.stillness.doubt == "") is trusted
+    if not trusted:
+        assert left.stillness.doubt == "went from 0.30 to 0.00 m/s in 0.02 s"
+    left.on_status(status(READY, 0), 10.0 + after_s)
+    assert left.age_s(10.0 + after_s) == 0.0
+
+
+def test_a_velocity_read_before_anything_was_received_is_believed() -> None:
+    left = axis()
+    left.on_speed(0, 10.0)
+    assert left.stillness.doubt == ""
+
+
+@pytest.mark.parametrize(("word", "controlword"), [(ENABLED, 0x7F), (READY, 0x07)])
+def test_a_drive_in_mode_vl_runs_its_ramp_only_while_it_is_enabled(word: int, controlword: int) -> None:
+    robot = robot_with("inverter")
+    drive = robot.drives[0]
+    wheel = Axis(drive, NodeLayout(drive.node_id, (0,), drive.kind), robot)
+    state = decode_statusword(word)
+    frame = wheel.setpoint(PowerGoal.ON, 0.0, next_controlword(state, PowerGoal.ON))
+    assert int.from_bytes(frame.data[:2], "little") == controlword
+
+
+def test_how_a_wheel_stopped_while_its_drive_restarted_is_unknown_and_no_lie() -> None:
+    """0.3 m/s until 10.2 s. Its drive restarts, and reports standstill 5 s later: it may have braked meanwhile."""
+    left = axis()
+    for n in range(21):
+        drives(left, 0.003 * n, 0.3, 10.0 + 0.01 * n)
+    left.forget()
+    for n in range(30):
+        left.on_status(status(READY, 0), 15.0 + 0.01 * n)
+        left.on_velocity(velocity(0), 15.0 + 0.01 * n)
+    assert left.stillness.doubt == ""
+    assert left.is_proven_to_stand(15.29)

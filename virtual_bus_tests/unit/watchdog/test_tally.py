@@ -22,6 +22,35 @@ def test_a_bad_cycle_is_one_and_a_good_one_half_of_it_back(pattern: str, value: 
     assert count(pattern) == value
 
 
+# the first tally sends one frame a cycle, with a drift: none, then two; the second is two drives with one node id
+@pytest.mark.parametrize(
+    ("frames_a_cycle", "value"),
+    [
+        ([], 0.0),
+        ([1], 0.0),
+        ([0], 0.0),
+        ([2], 1.0),
+        ([2, 0], 0.0),
+        ([2, 2, 0], 1.0),
+        ([2, 1], 0.5),
+        ([2, 1, 0], 0.0),
+        ([3, 2], 2.0),
+    ],
+)
+def test_two_frames_in_a_cycle_and_none_in_another_make_up_for_each_other(
+    frames_a_cycle: list[int], value: float
+) -> None:
+    tally = Tally()
+    for frames in frames_a_cycle:
+        tally.balance(frames)
+    assert tally.value == value
+
+
+@pytest.mark.parametrize(("pattern", "value"), [("xx.....", 0.0), ("x..x", 1.0)])
+def test_good_cycles_leave_no_credit(pattern: str, value: float) -> None:
+    assert count(pattern) == value
+
+
 def test_one_bad_cycle_in_three_does_not_add_up() -> None:
     assert count("x.." * 1000) == 0.0
 
