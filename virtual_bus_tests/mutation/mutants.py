@@ -194,10 +194,16 @@ class _Stripper(ast.NodeTransformer):
 
 
 def behaviour(source: str) -> str:
-    """The text without what no behaviour hangs on, comments and layout too; empty when it does not compile."""
+    """The text without what no behaviour hangs on, comments and layout too; empty when it does not compile.
+
+    Also empty with an argument that is positional only: the `*` before keywords was taken for a product.
+    """
     try:
         compile(source, "<mutant>", "exec")
-        return ast.unparse(_Stripper().visit(ast.parse(source)))
+        tree = ast.parse(source)
+        if any(isinstance(node, ast.arguments) and node.posonlyargs for node in ast.walk(tree)):
+            return ""
+        return ast.unparse(_Stripper().visit(tree))
     except (SyntaxError, ValueError):
         return ""
 

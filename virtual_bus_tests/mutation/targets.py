@@ -111,7 +111,7 @@ TARGETS = (
     _watchdog("bus_health"),
     _driver("cia402", then=("driver/axis", "chain/layouts_agree")),
     _driver("drives/axis", then=("driver/canopen_node", "driver/core")),
-    _driver("drives/standstill", then=("driver/core",)),
+    _driver("drives/standstill", "driver/standstill", "driver/standstill_limits", then=("driver/core",)),
     _driver("drives/stall", then=("driver/core",)),
     _driver("drives/let_go", then=("chain/dead_encoder_at_a_stand",)),
     _driver("motion/limiter", then=("driver/limiter_properties", "driver/braking", "velocity/ramp")),

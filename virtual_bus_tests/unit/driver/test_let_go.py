@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -191,8 +192,8 @@ def test_a_drive_that_ignores_disable_operation_is_told_disable_voltage(
     watchdog = mine.watchdog.model_copy(update={"stand_answer_s": answer_s})
     timeouts = mine.timeouts.model_copy(update={"feedback_s": feedback_s})
     wheels, each = (due(), Wheel()), LetGo(mine.model_copy(update={"watchdog": watchdog, "timeouts": timeouts}))
-    each.step(wheels, True, 1.0)
-    words = [next_controlword(ENABLED, each.goal(at)) for at in (1.0, 0.999 + until_s, 1.001 + until_s)]
+    each.step(wheels, True, 0.0)
+    words = [next_controlword(ENABLED, each.goal(at)) for at in (0.0, until_s, math.nextafter(until_s, 1.0))]
     assert words == [0x07, 0x07, Command.DISABLE_VOLTAGE.value]
 
 
@@ -215,3 +216,23 @@ def test_a_drive_of_unknown_state_may_have_torque() -> None:
     wheels[0].state, wheels[1].state = None, ON
     each.step(wheels, True, 1.01)
     assert each.goal(1.01) is PowerGoal.LET_GO
+
+
+@pytest.mark.parametrize(("counts", "lives"), [(1, False), (2, True)])
+def test_of_a_coarse_encoder_two_counts_are_a_sign_of_life(counts: int, lives: bool) -> None:
+    each = Push(LIMIT_S, 2**-8)
+    each.on_sample(0.0, 1.0, 0.1, True, 0.0)
+    each.on_sample(counts * 2**-8, 1.0, 0.1, True, CYCLE_S)
+    assert each.lives is lives
+
+
+def test_before_its_first_sample_nothing_is_held_against_a_wheel() -> None:
+    assert push().lives
+
+
+@pytest.mark.parametrize(("share", "pushed"), [(0.01, True), (-0.01, True), (0.00999, False)])
+def test_from_a_hundredth_of_the_rated_torque_on_a_wheel_may_move(share: float, pushed: bool) -> None:
+    each = push()
+    for now_s in (0.0, CYCLE_S):
+        each.on_sample(0.0, share, 0.1, True, now_s)
+    assert (each.pushed_s > 0.0) is pushed

@@ -108,5 +108,6 @@ def test_the_sentence_has_values_limits_and_keys() -> None:
 def test_without_a_time_of_its_own_it_is_named_before_the_watchdog_misses_the_motion() -> None:
     robot = bench_robot()
     assert StallLimits.of(robot) == StallLimits(0.8, STALL_PART * robot.watchdog.motion_missing_s, 0.005)
+    assert StallLimits.of(robot).time_s == pytest.approx(0.22)
     given = robot.model_copy(update={"health": robot.health.model_copy(update={"stall_time_s": 0.5})})
     assert StallLimits.of(given).time_s == 0.5
