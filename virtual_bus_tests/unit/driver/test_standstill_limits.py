@@ -68,7 +68,7 @@ STAY_M = LIMITS.standstill_mps * STILL_S
         (2**-4, -STAY_M, STILL_S, True),
     ],
 )
-def test_noise_is_standstill_once_the_encoder_has_stayed_for_two_tenths(
+def test_a_little_speed_is_standstill_once_the_encoder_has_stayed_for_two_tenths(
     velocity_mps: float, moved_m: float, after_s: float, still: bool
 ) -> None:
     samples = (0.0, 0.0, velocity_mps), (0.1, moved_m, velocity_mps), (after_s, moved_m, velocity_mps)
