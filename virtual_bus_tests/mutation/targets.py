@@ -93,6 +93,7 @@ TARGETS = (
     _watchdog("pair"),
     _watchdog("creep"),
     _watchdog("halt"),
+    _watchdog("hard_braking"),
     _watchdog("plausibility", then=(*STORIES, *SENSORS)),
     _watchdog("overshoot", "watchdog/lies", "watchdog/runaway", then=(*STORIES, *SENSORS)),
     _watchdog("motion_evidence", then=("watchdog/observer", *SENSORS)),

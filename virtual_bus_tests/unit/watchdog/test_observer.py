@@ -416,3 +416,20 @@ def test_no_noise_untrips(seed: int) -> None:
     assert story.watchdog.status.state is State.TRIPPED
     refused = story.watchdog.refused_leases
     assert refused[Refusal.LENGTH] + refused[Refusal.MAGIC] == 10_000
+
+
+@pytest.mark.parametrize(("hard", "high_mps"), [((), 0.3), ((True,), 0.2), ((True, True), 0.2), ((True, False), 0.3)])
+def test_under_brakes_hard_every_wheel_has_to_slow_down_so(hard: tuple[bool, ...], high_mps: float) -> None:
+    """0.4 m/s, then zero. Allowed for drive_lag_s (0.1 s) as before, and 0.1 s later with 1 or with 2 m/s²."""
+    it = observer()
+    for n in range(41):
+        now_s, target = 1.0 + 0.01 * n, 400 if n < 20 else 0
+        if n == 20:
+            for flag in hard:
+                it.brake(flag)
+        for node_id in (1, 2):
+            it.on_frame(0x180 + node_id, bytes.fromhex("37 02 00 00 00 00"), now_s)
+            it.on_frame(0x200 + node_id, struct.pack("<Hi", 0x0F, target), now_s)
+            it.on_frame(0x080, b"", now_s)
+            it.on_frame(0x280 + node_id, struct.pack("<i", 0), now_s)
+    assert [axis.feedback.high_mps for axis in look(it).axes] == pytest.approx([high_mps, high_mps], abs=0.021)
