@@ -44,7 +44,7 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.cycle_stats import CycleStats
 from canbase_driver.supervision.fault_reset import Outcome
-from canbase_driver.supervision.latch import PowerRecord, found_before_the_start
+from canbase_driver.supervision.latch import PowerRecord, allowed_before_the_start, found_before_the_start
 from canbase_driver.supervision.lifecycle import Aim, Lifecycle
 from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
 from canbase_driver.supervision.reset_run import ResetRun
@@ -73,7 +73,7 @@ class DriverCore:
         """`aim`: how far it goes by itself. `found`: the record of its stops at the start; None: no record is kept,
         which is for virtual time alone."""
         self._robot = robot
-        self._readiness = Lifecycle(robot, aim)
+        self._readiness = Lifecycle(robot, aim, allowed_before_the_start(found))
         self._period_s = 1.0 / robot.rates.control_hz
         self._drives = Drives(robot)
         self._sync = SyncProducer(robot.bus.sync_counter)
@@ -221,7 +221,7 @@ class DriverCore:
         frames += self._stop_by_sdo(orders, situation, now_s)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
             self._eased_at = now_s
-        let_go = self._readiness.step(situation, self.state, self.finding, now_s)
+        let_go = self._readiness.step(situation, self.state, self.finding, now_s, self._record.unrecorded)
         if let_go or (self.finished and not self._readiness.released):
             frames += self._end_communication(let_go, now_s)
         return frames
@@ -242,7 +242,7 @@ class DriverCore:
     def _judge(self, situation: Situation, now_s: float) -> Orders:
         before, latched_before = self._state_machine.state, self._state_machine.latches
         orders = self._state_machine.step(situation, now_s)
-        self._record.note(self._state_machine, situation)
+        self._record.note(self._state_machine, situation, self._readiness.allowed)
         state, finding = self._state_machine.state, self._state_machine.finding
         began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
         continued = before is DriverState.STOPPING and state in (DriverState.STOPPING, DriverState.LATCHED)

@@ -56,7 +56,7 @@ class Rig:
     def __init__(self, autostart: bool) -> None:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self.loop = PlayedLoop(Aim.ACTIVE if autostart else Aim.RELEASED)
-        self.node = ManagedNode("motor_driver", self.loop, autostart)  # type: ignore[arg-type]
+        self.node = ManagedNode("motor_driver", self.loop)  # type: ignore[arg-type]
         self.node.request_times = NoPauses()  # type: ignore[assignment]
         self._executor = EventsExecutor()
         self._executor.add_node(self.node)

@@ -38,16 +38,17 @@ AIMS = {
 class ManagedNode(LifecycleNode):
     """The lifecycle of the driver as ROS sees it."""
 
-    def __init__(self, name: str, loop: ControlLoop, autostart: bool) -> None:
-        """`autostart`: it is active at once, and the driver boots and enables as soon as it can."""
+    def __init__(self, name: str, loop: ControlLoop) -> None:
+        """Its first state is how far the driver goes by itself."""
         super().__init__(name)
         refuse_sim_time(self, SetParametersResult)
         self._loop = loop
         self.request_times = ReceiveTimes.of_requests()
         """Whether a request that is taken in now may have waited while this process stood still."""
         answer_later(self._service_change_state, self._on_change_state)
-        if autostart:
+        if loop.aimed_at is not Aim.RELEASED:
             self.trigger_configure()
+        if loop.aimed_at is Aim.ACTIVE:
             self.trigger_activate()
 
     def _on_change_state(self, asked: Asked) -> None:

@@ -47,8 +47,8 @@ STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 class MotorDriverNode(ManagedNode):
     """The ROS side of a `ControlLoop`."""
 
-    def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter, autostart: bool) -> None:
-        super().__init__("motor_driver", loop, autostart)
+    def __init__(self, robot: Robot, loop: ControlLoop, ring: Ring, writer: BlackBoxWriter) -> None:
+        super().__init__("motor_driver", loop)
         self._robot = robot
         self._receive_times = ReceiveTimes()
         self.voice = Voice(self.get_logger(), Journal("motor_driver"))

@@ -85,7 +85,7 @@ def run(
     core = DriverCore(robot, aim, keeper.found)
     loop = ControlLoop(core, claim.bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning, about(robot))
-    node = MotorDriverNode(robot, loop, ring, writer, autostart)
+    node = MotorDriverNode(robot, loop, ring, writer)
     publisher = Publisher(node, loop)
     threads = (loop, publisher, writer, keeper)
     gc.freeze()  # what is there now lives for ever: later collections need not look at it; of garbage there is little

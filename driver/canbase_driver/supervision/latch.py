@@ -2,18 +2,29 @@
 
 Rules: LIVE before there is power (the phase ARMING waits for it), and until all of it was measured to be off;
 LATCHED as soon as a stop latches; CLEAR else. So a kill, a crash, a hang and a power cut find LIVE or LATCHED on disk.
+Each record carries how far an operator lets the driver go (`code`): what was switched off stays off after a start.
 """
 
 from __future__ import annotations
 
 from canbase_driver.causes import Cause, Finding
+from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.phases import Phase
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.state_machine import StateMachine
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Defect, Found, Mark, Record, WriteAhead
 
+NOT_YET = "the driver's record of stops is not on disk yet"
 _WITH_POWER = (DriverState.ENABLING, DriverState.ENABLED, DriverState.STOPPING)
+
+
+def allowed_before_the_start(found: Found | None) -> Aim:
+    """How far an operator lets the driver go. A number that this version does not know: no power. A record that cannot
+    be used is latched, and its reset is an operator's request for power."""
+    if found is None or found.defect is not Defect.NONE:
+        return Aim.ACTIVE
+    return next((aim for aim in Aim if Aim.ACTIVE - aim == found.record.code), Aim.CONFIGURED)
 
 
 def found_before_the_start(found: Found | None) -> Finding | None:
@@ -50,20 +61,27 @@ class PowerRecord:
     @property
     def unarmed(self) -> str:
         """A sentence until LIVE is on disk; else empty."""
-        if self._ahead.wanted.mark is Mark.LIVE and self._ahead.is_on_disk:
-            return ""
-        return self._ahead.problem or "the driver's record of stops is not on disk yet"
+        is_live = self._ahead.wanted.mark is Mark.LIVE
+        return self.unrecorded if is_live else self.unrecorded or NOT_YET
 
-    def note(self, state_machine: StateMachine, situation: Situation) -> None:
-        """After the state machine's step."""
+    @property
+    def unrecorded(self) -> str:
+        """A sentence until what is wanted is on disk; else empty."""
+        if self._ahead.is_on_disk:
+            return ""
+        return self._ahead.problem or NOT_YET
+
+    def note(self, state_machine: StateMachine, situation: Situation, allowed: Aim) -> None:
+        """After the state machine's step. `allowed`: how far an operator lets the driver go."""
+        code = Aim.ACTIVE - allowed
         state, finding = state_machine.state, state_machine.finding
         if state is DriverState.LATCHED or (state is DriverState.STOPPING and state_machine.latches):
             if not state_machine.finished:  # the shutdown is no cause
-                self._ahead.want(Mark.LATCHED, cause=finding.cause.value, detail=finding.detail)
+                self._ahead.want(Mark.LATCHED, code, cause=finding.cause.value, detail=finding.detail)
         elif self._is_live(state_machine, situation):
-            self._ahead.want(Mark.LIVE)
+            self._ahead.want(Mark.LIVE, code)
         else:
-            self._ahead.want(Mark.CLEAR)
+            self._ahead.want(Mark.CLEAR, code)
 
     def _is_live(self, state_machine: StateMachine, situation: Situation) -> bool:
         """Power is about to come, is there, or was there and was not measured to be off."""

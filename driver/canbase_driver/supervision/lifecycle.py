@@ -6,7 +6,8 @@ RELEASED ──configure──► CONFIGURED ──activate──► ACTIVE     
 What is aimed at is the state of the lifecycle: ROS shows it (`managed_node.py`), and owns none of its own.
 
 Rules. What is aimed at holds at once: less than ACTIVE is a reason to stop (`state_machine.py`), and RELEASED follows
-only when nothing has power. A latched stop outlives every change: `reset` alone ends it. Pure: time is an argument.
+only when nothing has power. A latched stop outlives every change: `reset` alone ends it. What an operator switched off
+stays off over restarts: `allowed` is part of the record on disk (`latch.py`). Pure: time is an argument.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ class Aim(IntEnum):
 @dataclass(frozen=True, slots=True)
 class _Change:
     before: Aim
+    allowed_before: Aim
     until: float
     on_outcome: Callable[[Outcome], None]
 
@@ -49,10 +51,14 @@ class _Change:
 class Lifecycle:
     """What is aimed at, and the change on its way there."""
 
-    def __init__(self, robot: Robot, aim: Aim) -> None:
+    def __init__(self, robot: Robot, aim: Aim, allowed: Aim = Aim.ACTIVE) -> None:
+        """`aim`: of a start. `allowed`: as an operator left it before the start."""
         timeouts = robot.timeouts
-        self.aim = aim
-        self.released = aim is Aim.RELEASED
+        self.aim = min(aim, allowed)
+        self.allowed = allowed
+        """How far it may go after a restart: less than ACTIVE once an operator has switched it off."""
+        self._kept_off = self.aim < aim
+        self.released = self.aim is Aim.RELEASED
         """Nothing is sent: never configured, or cleaned up again."""
         self._change: _Change | None = None
         stop_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
@@ -65,40 +71,61 @@ class Lifecycle:
     @property
     def unconfigured(self) -> str:
         """A sentence while drives must not be booted; else empty."""
-        return "lifecycle: unconfigured" if self.aim is Aim.RELEASED else ""
+        return f"lifecycle: unconfigured{self._since}" if self.aim is Aim.RELEASED else ""
 
     @property
     def inactive(self) -> str:
         """A sentence while drives must not have power; else empty."""
-        return "" if self.aim is Aim.ACTIVE else "lifecycle: not active"
+        return "" if self.aim is Aim.ACTIVE else f"lifecycle: not active{self._since}"
+
+    @property
+    def _since(self) -> str:
+        return ", switched off by an operator before this start" if self._kept_off else ""
 
     def request(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
         """Aim at that; `on_outcome` is called once, when it is there or has failed."""
         if self._change is not None:
             on_outcome(Outcome(False, f"refused: a change to {self.aim.name} is under way"))
             return
-        self._change = _Change(self.aim, now_s + self._patience_s[aim], on_outcome)
-        self.aim = aim
+        self._change = _Change(self.aim, self.allowed, now_s + self._patience_s[aim], on_outcome)
+        if aim <= self.aim:
+            self.allowed = min(self.allowed, aim)
+        self.aim, self._kept_off = aim, self._kept_off and aim is not Aim.ACTIVE
         self.released = self.released and aim is Aim.RELEASED
 
-    def step(self, situation: Situation, state: DriverState, finding: Finding, now_s: float) -> bool:
-        """Once a cycle, after the state machine. True: the drives are to be released now."""
+    def step(
+        self, situation: Situation, state: DriverState, finding: Finding, now_s: float, unrecorded: str = ""
+    ) -> bool:
+        """Once a cycle, after the state machine. True: the drives are to be released now. `unrecorded`: why `allowed`
+        is not on disk; a change is done only when it is."""
         let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
         self.released = self.released or let_go
         change = self._change
         if change is not None:
-            outcome = self._outcome(change, situation, state, finding, now_s)
+            outcome = self._outcome(change, situation, state, finding, now_s, unrecorded)
             if outcome is not None:
                 self._end(change, outcome)
         return let_go
 
     def _outcome(
-        self, change: _Change, situation: Situation, state: DriverState, finding: Finding, now_s: float
+        self,
+        change: _Change,
+        situation: Situation,
+        state: DriverState,
+        finding: Finding,
+        now_s: float,
+        unrecorded: str,
     ) -> Outcome | None:
-        if self._there(change, situation, state):
+        there = self._there(change, situation, state)
+        if there and self.allowed < self.aim:  # an activation that fails leaves the record as it was
+            self.allowed = self.aim
+            return None
+        if there and unrecorded and now_s > change.until:
+            return Outcome(False, f"{self.aim.name.lower()}, and a restart may not keep it: {unrecorded}")
+        if there and not unrecorded:
             return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {finding.cause.value})")
         hopeless = self.aim is Aim.ACTIVE and state is DriverState.LATCHED
-        if hopeless or now_s > change.until:
+        if not there and (hopeless or now_s > change.until):
             ends = f"; ends with: {finding.clears_on}" if finding.clears_on else ""
             return Outcome(
                 False, f"not {self.aim.name.lower()}: {finding.cause.value} {finding.detail}".rstrip() + ends
@@ -117,5 +144,5 @@ class Lifecycle:
     def _end(self, change: _Change, outcome: Outcome) -> None:
         self._change = None
         if not outcome.done and self.aim > change.before:
-            self.aim = change.before
+            self.aim, self.allowed = change.before, change.allowed_before
         change.on_outcome(outcome)
