@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
-from typing import IO, TYPE_CHECKING
+from typing import BinaryIO
 
 import can
 
 from canbase_recording.can_message import FRAME_TYPE, NOTES_TOPIC, unpack_frame, unpack_text
 from canbase_recording.entry import Note
 
-if TYPE_CHECKING:
-    from canbase_recording.recording_file import Problems
 
+def messages(file: BinaryIO) -> Iterator[can.Message | Note | None]:
+    """In the order of the file; None: one that cannot be understood. Raises whatever the library raises."""
+    from mcap.reader import NonSeekingReader
 
-def messages(file: IO[bytes], problems: Problems) -> Iterator[can.Message | Note]:
-    """In the order of the file. What is broken is counted; a file that ends early is read up to there."""
-    try:
-        from mcap.exceptions import McapError
-        from mcap.reader import NonSeekingReader
-    except ModuleNotFoundError as error:
-        problems.truncated = f"MCAP needs the Python package {error.name}: pip install 'mcap>=1.2,<2'"
-        return
-    try:
-        for schema, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
-            at_s = message.log_time / 1e9
-            is_note = channel.topic.rstrip("/").endswith(NOTES_TOPIC)
-            if not is_note and (schema is None or schema.name != FRAME_TYPE):
-                continue
-            try:
-                yield Note(at_s, unpack_text(message.data)) if is_note else _frame(at_s, message.data)
-            except ValueError:
-                problems.broken += 1
-    except (McapError, struct.error, ValueError, EOFError, KeyError, AssertionError, OSError) as error:
-        problems.truncated = f"{type(error).__name__} {error}".strip()
+    for schema, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+        at_s = message.log_time / 1e9
+        is_note = channel.topic.rstrip("/").endswith(NOTES_TOPIC)
+        if not is_note and (schema is None or schema.name != FRAME_TYPE):
+            continue
+        try:
+            yield Note(at_s, unpack_text(message.data)) if is_note else _frame(at_s, message.data)
+        except ValueError:
+            yield None
 
 
 def _frame(at_s: float, data: bytes) -> can.Message:

@@ -10,30 +10,28 @@ import contextlib
 import json
 import math
 import re
-import struct
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 import can
-from can.io.blf import BLFParseError
 
+from canbase_recording import foreign_reader
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.text_lines import TextLines
 
-_BROKEN: Final = (
-    ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, EOFError, AssertionError, struct.error,
-    zlib.error, BLFParseError, can.CanError,
-)  # fmt: skip
-"""What python-can's readers raise for content that they do not understand."""
+_BROKEN: Final = (ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError)
+"""What a line of a watchdog raises that is none."""
 CLOCK_STEP_S: Final = 0.1
 """A frame that is older than the one before by more: the clock was set back. By less: it was written out of order."""
 GAP_S: Final = 60.0
 """A pause of this length is worth a remark."""
+LATEST_S: Final = 2.0**31 - 1.0
+"""Since 1970: later times do not fit into a ROS message."""
 MOST_RESTARTS: Final = 1_000_000
 HEAD_BYTES: Final = 4_096
 WATCHDOGS: Final = b'{"format": 1, "part": "watchdog"'
@@ -93,6 +91,7 @@ class RecordingFile:
         """`channel`: as the file names it; None: that of its first frame. Raises NoRecordingError."""
         self.path, self.problems = path, Problems()
         self.frames = 0
+        self._position = 0
         self.began_text = ""
         """Date and time of the first entry, as the file gives them; empty: it does not."""
         self.began_s = 0.0
@@ -114,7 +113,7 @@ class RecordingFile:
     @property
     def position(self) -> int:
         """How many of its `size` bytes have been read."""
-        return self._file.tell() if not self._file.closed else self.size
+        return self.size if self._file.closed else self._position or self._file.tell()
 
     def __enter__(self) -> RecordingFile:
         return self
@@ -152,8 +151,8 @@ class RecordingFile:
         text = head.decode("utf-8", errors="replace")
         first = next((line for line in text.splitlines() if line.strip()), "")
         for begin, name, read in (
-            (b"LOGG", "BLF", self._binary),
-            (b"\x89MCAP", "MCAP", self._mcap),
+            (b"LOGG", "BLF", self._foreign),
+            (b"\x89MCAP", "MCAP", self._foreign),
             (WATCHDOGS, "inputs of a watchdog", self._inputs),
         ):
             if head.startswith(begin):
@@ -187,7 +186,7 @@ class RecordingFile:
                         message.timestamp = since_s
                     yield message
                 return
-            except _BROKEN:
+            except Exception:  # noqa: BLE001 - python-can's, whatever it raises for a line that it does not understand
                 lines.resume()
         self.problems.truncated = f"{MOST_RESTARTS} lines could not be read"
 
@@ -205,21 +204,16 @@ class RecordingFile:
                 is_fd=len(data) > 8,
             )  # fmt: skip
 
-    def _binary(self) -> Iterator[can.Message]:
-        """BLF: what follows a broken container cannot be found again."""
-        try:
-            reader = can.BLFReader(self._file)
-            yield from reader
-        except _BROKEN as error:
-            self.problems.truncated = f"at {self.position} of {self.size} bytes ({type(error).__name__})"
-        else:
-            if reader.file_size > self.size:
-                self.problems.truncated = f"it has {self.size} of {reader.file_size} bytes"
-
-    def _mcap(self) -> Iterator[can.Message | Note]:
-        from canbase_recording.mcap_import import messages
-
-        yield from messages(self._file, self.problems)
+    def _foreign(self) -> Iterator[can.Message | Note]:
+        """By a library in a process of its own. What follows a broken container cannot be found again."""
+        if self.format == "MCAP" and find_spec("mcap") is None:
+            self.problems.truncated = "MCAP needs the Python package mcap: pip install 'mcap>=1.2,<2'"
+            return
+        for message in foreign_reader.messages(self.format, self._file, self.size, self.problems):
+            if isinstance(message, int):
+                self._position = message
+            else:
+                yield message
 
     def _inputs(self) -> Iterator[can.Message]:
         """The frames that a watchdog received: of a stop in which the driver died with its own recording."""
@@ -237,7 +231,7 @@ class RecordingFile:
                     yield can.Message(
                         offset_s + at_s, cob_id, is_extended_id=False, data=bytes.fromhex(data), check=True
                     )
-            except (*_BROKEN, RecursionError):
+            except _BROKEN:
                 self.problems.broken += 1
 
     def _notes(self) -> Iterator[Note]:
@@ -246,6 +240,9 @@ class RecordingFile:
             yield Note(self._last_s if at_s is None else max(at_s, self._last_s), text[:NOTE_LENGTH])
 
     def _frame(self, message: can.Message) -> RecordedFrame | None:
+        if not 0 <= message.arbitration_id < MOST_IDENTIFIERS:
+            self.problems.broken += 1
+            return None
         channel = "" if message.channel is None else str(message.channel)
         if self._channel is None:
             self._channel = channel
@@ -260,7 +257,7 @@ class RecordingFile:
 
     def _time(self, raw_s: float) -> float:
         """Seconds since the first entry, which never go back."""
-        if not math.isfinite(raw_s):
+        if not 0.0 <= raw_s < LATEST_S:  # nan too
             self.problems.broken += 1
             return self._last_s
         if math.isnan(self._raw_last_s):
@@ -276,11 +273,16 @@ class RecordingFile:
             self.problems.gaps += 1
             self.problems.longest_gap_s = max(self.problems.longest_gap_s, step_s)
         self._raw_last_s = raw_s if step_s > 0.0 or step_s < -CLOCK_STEP_S else self._raw_last_s
-        self._last_s = max(self._last_s, raw_s + self._shift_s)
+        if self.began_s + raw_s + self._shift_s < LATEST_S:
+            self._last_s = max(self._last_s, raw_s + self._shift_s)
+        else:
+            self.problems.broken += 1
         return self._last_s
 
 
 MOST_CHANNELS: Final = 100
+MOST_IDENTIFIERS: Final = 1 << 29
+"""Of extended frames; python-can's readers check none."""
 NOTE_LENGTH: Final = 1_200
 """Characters; those of canbase are shorter."""
 RELATIVE: Final = ("ASC", "TRC")
@@ -297,7 +299,8 @@ def _seconds(date: str) -> float:
     """Since 1970, of a date of an ASC file in local time; 0: it is none that is known."""
     for form in _DATES:
         with contextlib.suppress(ValueError, OverflowError):
-            return datetime.strptime(date, form).timestamp()  # noqa: DTZ007 - the file has no zone
+            began_s = datetime.strptime(date, form).timestamp()  # noqa: DTZ007 - the file has no zone
+            return began_s if 0.0 <= began_s < LATEST_S else 0.0
     return 0.0
 
 
