@@ -267,7 +267,7 @@ def test_sigterm_and_sigint_end_with_zeros_until_the_base_can_stand(
     assert (chain.state.last.cause, chain.state.last.action) == ("shutdown", SafetyState.STOP)
     assert chain.mux.last is not None
     assert [source.reason for source in chain.mux.last.sources] == ["shutdown"] * 3
-    assert chain.leases[-1][3:6] == (0.0, 0.0, 1)
+    assert chain.leases[-1][3:6] == (0.0, 0.0, 0)
     assert "Traceback" not in chain.process.log()
 
 
