@@ -131,14 +131,25 @@ def _never_frozen(self: FrozenWatch, scan: Scan, now_s: float, *, moves: bool) -
     return ""
 
 
+def _brakes_softly_too(take_out: Callable[[], None]) -> Callable[[], None]:
+    """Without a recent state frame of the watchdog the driver brakes hard by itself: that is taken out as well."""
+
+    def both() -> None:
+        take_out()
+        _put(watchdog_link.WatchdogLink, "brakes_hard", lambda self, now_s: False)()
+
+    return both
+
+
 SAFEGUARDS: dict[str, Callable[[], None]] = {
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
     "watchdog:latch": _no_latch,
     **{f"driver:{row.cause.value.replace(' ', '_')}": _reason(Hazard, row.cause) for row in HAZARDS},
     "driver:latch": _driver_forgets,
-    "driver:asks_for_watchdog": _put(
-        watchdog_link.WatchdogLink, "view", lambda self, now_s: (WatchdogView.OK, "")
+    "driver:watchdog_missing": _brakes_softly_too(_reason(Hazard, Cause.WATCHDOG_MISSING)),
+    "driver:asks_for_watchdog": _brakes_softly_too(
+        _put(watchdog_link.WatchdogLink, "view", lambda self, now_s: (WatchdogView.OK, ""))
     ),
     "driver:command_timeout": _put(command.Command, "is_fresh", lambda self, now_s: self.received_at > 0.0),
     "driver:zero_before_motion": _put(command.Command, "await_zero", lambda self: None),
