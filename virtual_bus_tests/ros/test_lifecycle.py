@@ -164,6 +164,9 @@ def test_shutdown_at_speed_stops_the_wheels_and_the_process_stays_without_a_driv
     assert active.state == State.PRIMARY_STATE_FINALIZED
     assert active.robot.stack.death() is None
     active.joystick.message = None
-    active.robot.stack.end("driver")  # the cure: a new process
+    active.robot.stack.end("driver")  # the cure: a new process, and an activation
     active.robot.stack.start()
+    assert "switched off by an operator" in active.robot.wait_state(DriverStatus.OFFLINE).detail
+    assert active.state == State.PRIMARY_STATE_UNCONFIGURED
+    active.go_to(State.PRIMARY_STATE_ACTIVE)
     active.robot.wait_whole()
