@@ -10,7 +10,7 @@ from typing import Annotated, Final
 import typer
 
 from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments, ros_needed
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
+from canbase_runtime.terminal import WRONG_INPUT, fail, load_config
 
 SHORTEST_TOKEN: Final = 16
 """Characters."""
@@ -47,7 +47,7 @@ def web(
             raise
         fail(f"canbase web needs the Python package {error.name}: pip install 'nicegui>=3.18,<4'", WRONG_INPUT)
     token = secrets.token_urlsafe(24) if token_file is None else _token(token_file)
-    _need_port(host, port)
+    _need_one_address(host)
     run(loaded, Address(host, port, token), arguments, namespace)
 
 
@@ -61,18 +61,10 @@ def _token(file: Path) -> str:
     return token
 
 
-def _need_port(host: str, port: int) -> None:
-    """Exits with 1 where another program has it, with 2 for an address under which no browser opens the page."""
+def _need_one_address(host: str) -> None:
+    """Exits with 2 for an address under which no browser opens the page."""
     import ipaddress
-    import socket
 
     with contextlib.suppress(ValueError):
         if ipaddress.ip_address(host).is_unspecified:
             fail(f"--host {host} names no address: give that of one interface, as in the browser", WRONG_INPUT)
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            fail(f"{host}:{port} cannot be had: {error.strerror}; give another --port", FAILED)

@@ -7,17 +7,21 @@ A page of any other site can make a browser send requests to 127.0.0.1. It has n
 from __future__ import annotations
 
 import hmac
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from http.cookies import CookieError, SimpleCookie
 from typing import Final
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlencode
 
 COOKIE: Final = "canbase_web_{port}"
 """A browser gives a cookie to every port of a host: by one name the pages of two robots would replace each other's."""
 MOST_BODY_BYTES: Final = 65_536
 """No request of the page is longer."""
+_NAME: Final = re.compile(r"[A-Za-z0-9!#$%&'*+.^_`|~-]+")
+"""Of a header (RFC 9110, 5.6.2)."""
+_CONTROL: Final = re.compile(r"[\r\n\0]")
 
 
 class Verdict(Enum):
@@ -29,6 +33,7 @@ class Verdict(Enum):
     OTHER_HOST = (403, "this host name is not that of the page")
     OTHER_SITE = (403, "a page of another site has sent this")
     TOO_LONG = (413, "the request is too long")
+    MALFORMED = (400, "no browser sends such a request")
 
     @property
     def status(self) -> int:
@@ -42,6 +47,46 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Request:
+    """The head of one. `headers`: by lower-case name."""
+
+    method: str
+    path: str
+    query: str
+    headers: Mapping[str, str]
+
+    def alone(self) -> bytes:
+        """As it came, but the last of its connection: each request is judged. A websocket goes on."""
+        headers = dict(self.headers)
+        if headers.get("upgrade", "").lower() != "websocket":
+            headers["connection"] = "close"
+        lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
+        target = f"{self.path}?{self.query}" if self.query else self.path
+        return f"{self.method} {target} HTTP/1.1\r\n{lines}\r\n".encode("latin-1")
+
+
+def parsed(head: bytes) -> Request | None:
+    """The head of a request, without its end; None: it is none, or one that could be read in two ways."""
+    text = head.decode("latin-1")
+    line, *rest = text.split("\r\n")
+    words, pairs = line.split(" "), [each.partition(":") for each in rest]
+    headers = {name.lower(): value.strip(" \t") for name, _, value in pairs}
+    is_plain = (
+        len(words) == 3
+        and words[1].startswith("/")
+        and words[2] == "HTTP/1.1"
+        and all(colon and _NAME.fullmatch(name) for name, colon, _ in pairs)
+        and len(headers) == len(pairs)
+        and "transfer-encoding" not in headers
+        and _CONTROL.search(text.replace("\r\n", "")) is None
+    )
+    if not is_plain:
+        return None
+    path, _, query = words[1].partition("?")
+    return Request(words[0], path, query, headers)
+
+
+@dataclass(frozen=True, slots=True)
 class Access:
     """`token`: of the address; `cookie`, `session`: the cookie's name and value; `hosts`: what a Host header may name,
     with its port."""
@@ -51,8 +96,9 @@ class Access:
     session: str
     hosts: frozenset[str]
 
-    def judge(self, headers: Mapping[str, str], query: str) -> Verdict:
-        """Of one request, HTTP or websocket. `headers`: by lower-case name."""
+    def judge(self, request: Request) -> Verdict:
+        """Of one request, HTTP or websocket."""
+        headers = request.headers
         if headers.get("host", "").lower() not in self.hosts:
             return Verdict.OTHER_HOST
         origin = headers.get("origin")
@@ -62,8 +108,16 @@ class Access:
             return Verdict.TOO_LONG
         if _same(_value(self.cookie, headers.get("cookie", "")), self.session):
             return Verdict.PASSES
-        given = parse_qs(query).get("token", [""])[0]
-        return Verdict.LOGS_IN if _same(given, self.token) else Verdict.NO_TOKEN
+        given = parse_qs(request.query).get("token", [""])[0]
+        return Verdict.LOGS_IN if request.method == "GET" and _same(given, self.token) else Verdict.NO_TOKEN
+
+    def login(self, request: Request) -> tuple[tuple[str, str], ...]:
+        """Headers of the answer to one that logs in: the same address without the token, and the cookie."""
+        query = parse_qs(request.query)
+        query.pop("token")
+        rest = urlencode(query, doseq=True)
+        place = "/" + request.path.lstrip("/") + (f"?{rest}" if rest else "")
+        return ("location", place), ("set-cookie", f"{self.cookie}={self.session}; Path=/; HttpOnly; SameSite=Strict")
 
 
 def authority(host: str, port: int) -> str:

@@ -14,7 +14,7 @@ from nicegui import Client, ui
 from canbase_config.derive import watchdog_config
 from canbase_config.load import Loaded
 from canbase_watchdog.envelope import Bounds, Envelope
-from canbase_web.commissioning_dialog import CommissioningDialog
+from canbase_web.commissioning_dialog import ENDS_S, CommissioningDialog
 from canbase_web.hold_socket import HoldSocket
 from canbase_web.now_view import Robot
 from canbase_web.presence import PERIOD_S, SEEN, Presence
@@ -113,24 +113,32 @@ class Pages:
         self.watch.begin(time.monotonic())
         self.link.goals.start(distance_m, speed_mps, lambda: self.watch.is_lost(time.monotonic()))
 
-    async def stop(self) -> tuple[bool, str]:
-        """The large stop: of every part that may move the wheels. Whether each of them stops, and what it said.
+    def stop_page(self, loop: asyncio.AbstractEventLoop) -> tuple[int, str]:
+        """The large stop: status and page of its answer. `loop`: of the pages; this waits in another thread."""
+        done, sentence = asyncio.run(self.stop(loop))
+        said = f"Stop: {sentence}" if done else f"STOP FAILED: {sentence}. Press the emergency stop at the robot."
+        return 200 if done else 503, (
+            f'<!doctype html><html lang="en"><title>Stop</title><body style="font:1.3rem sans-serif">'
+            f'<p>{html.escape(said)}</p><a href="/">back</a></body></html>'
+        )
+
+    async def stop(self, loop: asyncio.AbstractEventLoop) -> tuple[bool, str]:
+        """Of every part that may move the wheels. Whether each of them stops, and what it said.
 
         Commissioning may be at work beside a driver: until it has heard it, and while it waits for an answer.
         """
-        parts = [self.commissioning.end()] if self.commissioning.runs else []
+        parts = [self._end_commissioning(loop)] if self.commissioning.runs else []
         if not parts or self.link.has_driver:
             parts.append(self.link.stop())
         answers = await asyncio.gather(*parts)
         return all(done for done, _ in answers), "; ".join(sentence for _, sentence in answers)
 
-    def stop_answer(self, done: bool, sentence: str) -> str:
-        """The page after the stop, for a browser without script; the script takes its sentence."""
-        said = f"Stop: {sentence}" if done else f"STOP FAILED: {sentence}. Press the emergency stop at the robot."
-        return (
-            f'<!doctype html><html lang="en"><title>Stop</title><body style="font:1.3rem sans-serif">'
-            f'<p>{html.escape(said)}</p><a href="/">back</a></body></html>'
-        )
+    async def _end_commissioning(self, loop: asyncio.AbstractEventLoop) -> tuple[bool, str]:
+        ending = asyncio.run_coroutine_threadsafe(self.commissioning.end(), loop)
+        try:
+            return await asyncio.wait_for(asyncio.wrap_future(ending), 2 * ENDS_S)
+        except asyncio.TimeoutError:
+            return False, "the pages do not answer, and commissioning may be at work: wheels may turn"
 
 
 def section(title: str) -> ui.card:

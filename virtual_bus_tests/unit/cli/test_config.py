@@ -300,7 +300,7 @@ def test_a_word_that_ros_does_not_know_ends_a_process_before_it_opens_the_bus_or
 
 @pytest.mark.parametrize(
     ("command", "opens"),
-    [("up", "up._refuse_twice"), ("web", "web._need_port"), ("web", "web._token"), ("record", "record.end_signals")],
+    [("up", "up._refuse_twice"), ("web", "web._token"), ("record", "record.end_signals")],
 )
 def test_a_word_that_ros_does_not_know_ends_a_command_before_it_takes_a_name_or_a_port(
     command: str, opens: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
