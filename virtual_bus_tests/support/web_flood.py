@@ -27,7 +27,8 @@ FLOODS: Final = {
     "1500 handshakes at once": (HANDSHAKE, 1500),
 }
 """What each connection sends, and how many come at once; then the oldest makes room for a new one."""
-RENEWED_PER_S: Final = 1000
+RENEWED_PER_S: Final = 5000
+"""More than a loop that serves pages can refuse."""
 
 
 def flood(text: str, most: int, port: int) -> None:
