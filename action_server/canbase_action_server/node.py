@@ -26,7 +26,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from unique_identifier_msgs.msg import UUID
 
 from canbase_action_server import messages
@@ -38,7 +37,7 @@ from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, End, GoalQueue
 from canbase_action_server.goal_step import GoalStep
-from canbase_action_server.inputs import Inputs, Odometry
+from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_numbers, rejection, uuid_of
 from canbase_action_server.outcome import ErrorCode, Status
@@ -46,6 +45,7 @@ from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority
+from canbase_runtime.message_reader import MessageReader
 from canbase_runtime.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
 from canbase_runtime.received import Received
 from canbase_runtime.serialized_message import SerializedTwist
@@ -78,6 +78,7 @@ class DriveDistanceServer(Node):
         self._goal_queue = GoalQueue(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
+        self._reader = MessageReader()
         self._odometry_waiting: tuple[bytes, float] | None = None
         """The last message of odom that was not looked at yet, serialized, and when it was received."""
         self._request_times = ReceiveTimes(REQUEST_GAP_S, RESENT_S)
@@ -137,7 +138,7 @@ class DriveDistanceServer(Node):
     def _listen(
         self, kind: type[T], topic: str, qos: QoSProfile, callback: Callable[..., None], raw: bool = False
     ) -> None:
-        """`raw`: the callback gets bytes, as `deserialize_message` takes them."""
+        """`raw`: the callback gets bytes, as `MessageReader.read` takes them."""
         self.create_subscription(kind, topic, self._guarded(callback), qos, raw=raw)
 
     def _guarded(self, callback: Callable[..., Any], answer: Any = None) -> Callable[..., Any]:
@@ -160,8 +161,9 @@ class DriveDistanceServer(Node):
         """What was received, odometry too. To take a message of odom apart costs more than to receive it."""
         if self._odometry_waiting is not None:
             (serialized, received_s), self._odometry_waiting = self._odometry_waiting, None
-            odometry = _odometry_from(serialized, received_s)
-            if odometry is not None:
+            message = self._reader.read(serialized, OdometryMessage)
+            if message is not None:
+                odometry = messages.odometry_in(message, received_s)
                 self._inputs = replace(self._inputs, odometry=Received(odometry, received_s))
         return self._inputs
 
@@ -306,12 +308,3 @@ class DriveDistanceServer(Node):
         }
         priority = Priority.INFO if outcome.status is Status.SUCCEEDED else Priority.NOTICE
         self._write_log(GoalStep.ENDED, end.key, fields, priority)
-
-
-def _odometry_from(serialized: bytes, received: float) -> Odometry | None:
-    """From the bytes of odom; None also when they are no message: any node may publish any bytes."""
-    try:
-        message = deserialize_message(serialized, OdometryMessage)
-    except RuntimeError:  # RMWError
-        return None
-    return messages.odometry_in(message, received)

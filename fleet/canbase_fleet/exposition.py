@@ -56,7 +56,9 @@ class Exposition:
         for kind, count in self._view.stops.items():
             stops.add_metric(kind, count)
         yield stops
-        yield CounterMetricFamily(f"{PREFIX}messages_dropped", "Messages too large to be real.", self._view.dropped)
+        yield CounterMetricFamily(
+            f"{PREFIX}messages_dropped", "Messages too large to be real, or unreadable.", self._view.dropped
+        )
 
     def text(self, plain: bool) -> tuple[bytes, str]:
         """The text and its content type: OpenMetrics; `plain`: the older format of Prometheus."""

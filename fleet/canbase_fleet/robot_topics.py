@@ -1,7 +1,7 @@
 """The topics of one robot, read and never written: the shell of ROS. One node without an executor.
 
-The newest message of each topic is kept as it came, and deserialized when somebody asks for it: without a request this
-costs a look into five queues ten times a second. Subscriptions are best effort: no publisher waits for this process.
+The newest message of each topic that can be read is kept: without a request this costs a look into four queues, and
+three messages read, ten times a second. Subscriptions are best effort: no publisher waits for this process.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import Any, Final
 import rclpy
 from canbase.msg import DriverStatus, MuxState, SafetyState, StopEvent
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_fleet.robot_view import DRIVER, MUX, SAFETY, STOPS, RobotView, counted
 from canbase_runtime.foreign_text import NAME_LENGTH, SENTENCE_LENGTH, clean, printable
 from canbase_runtime.last_message import NOT_RECEIVED, LastMessage
+from canbase_runtime.message_reader import MessageReader
 from canbase_runtime.receive_time import ReceiveTimes
 
 POLL_S: Final = 0.1
@@ -48,27 +48,22 @@ class RobotTopics:
             topic: self._node.create_subscription(kind, topic, _unused, NEWEST, raw=True)
             for topic, kind in KINDS.items()
         }
-        self._stop_events = self._node.create_subscription(StopEvent, STOPS, _unused, STOP_QOS)
+        self._stop_events = self._node.create_subscription(StopEvent, STOPS, _unused, STOP_QOS, raw=True)
         self._receive_times = ReceiveTimes(GAP_S, POLL_S)
         self._lock = threading.Lock()
-        self._kept: dict[str, tuple[bytes, float]] = {}
+        self._reader = MessageReader()
+        self._kept: dict[str, tuple[Any, float]] = {}
         self._stops: dict[tuple[str, str], int] = {}
-        self._dropped = 0
+        self._too_long = 0
 
     def poll(self, now_s: float) -> None:
         """Take what came. To be called every POLL_S; ages are as exact as that. `now_s`: time.monotonic()."""
         received_s = self._receive_times.at(now_s)
         for topic, subscription in self._states.items():
-            message = _take(subscription)
-            with self._lock:
-                if message is not None and len(message) > MOST_BYTES:
-                    self._dropped += 1
-                elif message is not None:
+            for message in self._waiting(subscription, 1):
+                with self._lock:
                     self._kept[topic] = message, received_s
-        for _ in range(MOST_AT_ONCE):
-            event = _take(self._stop_events)
-            if event is None:
-                return
+        for event in self._waiting(self._stop_events, MOST_AT_ONCE):
             with self._lock:
                 self._stops = counted(
                     self._stops, printable(event.stopped_by, NAME_LENGTH), printable(event.cause, NAME_LENGTH)
@@ -77,28 +72,32 @@ class RobotTopics:
     def view(self) -> RobotView:
         """The robot now."""
         with self._lock:
-            kept, stops, dropped = dict(self._kept), self._stops, self._dropped
+            kept, stops, dropped = dict(self._kept), self._stops, self._reader.dropped + self._too_long
         now_s = time.monotonic()
-        driver, safety, mux = (_last(kept.get(topic), kind, now_s) for topic, kind in KINDS.items())
+        driver, safety, mux = (_last(kept.get(topic), now_s) for topic in KINDS)
         return RobotView(driver, safety, mux, stops, dropped)
+
+    def _waiting(self, subscription: Any, most: int) -> Iterator[Any]:
+        """The messages that wait and can be read, the oldest first."""
+        for _ in range(most):
+            serialized = self._reader.take(subscription)
+            if serialized is None:
+                return
+            if len(serialized) > MOST_BYTES:
+                self._too_long += 1
+            elif (message := self._reader.read(serialized, subscription.msg_type)) is not None:
+                yield clean(message, SENTENCE_LENGTH)
 
     def close(self) -> None:
         """ROS ends."""
         rclpy.try_shutdown()
 
 
-def _last(kept: tuple[bytes, float] | None, kind: type, now_s: float) -> LastMessage:
+def _last(kept: tuple[Any, float] | None, now_s: float) -> LastMessage:
     if kept is None:
         return NOT_RECEIVED
-    data, received_s = kept
-    return LastMessage(clean(deserialize_message(data, kind), SENTENCE_LENGTH), max(0.0, now_s - received_s))
-
-
-def _take(subscription: Any) -> Any:
-    """The oldest message that waits; None: none does."""
-    with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-    return None if taken is None else taken[0]
+    message, received_s = kept
+    return LastMessage(message, max(0.0, now_s - received_s))
 
 
 def _unused(message: Any) -> None:

@@ -26,6 +26,7 @@ from canbase_action_server.goal_errors import DriveError
 from canbase_config.robot import Robot as RobotConfig
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, clean, printable
 from canbase_runtime.last_message import NOT_RECEIVED, LastMessage
+from canbase_runtime.message_reader import MessageReader
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_web.hold import Speed
 from canbase_web.now_view import Robot
@@ -55,6 +56,7 @@ class RobotLink:
         rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
         self._node = node = rclpy.create_node("canbase_web", enable_rosout=False, start_parameter_services=False)
         self._kept: dict[str, tuple[Any, float]] = {}
+        self._reader = MessageReader()
         self._receive_times = ReceiveTimes()
         self._receive_times.at(time.monotonic())
         self._topics = {
@@ -93,7 +95,7 @@ class RobotLink:
         return self._last("mux", now_s)
 
     def _look(self, name: str, received_s: float) -> None:
-        if (message := _take(self._topics[name])) is not None:
+        if (message := self._reader.take(self._topics[name])) is not None:
             self._kept[name] = (clean(message), received_s)
 
     def _last(self, name: str, now_s: float) -> LastMessage:
@@ -104,11 +106,11 @@ class RobotLink:
 
     def scans(self) -> list[Any]:
         """The scan of each scanner that came since the last call, or None."""
-        return [_take(subscription) for subscription in self._scans]
+        return [self._reader.take(subscription) for subscription in self._scans]
 
     def new_stops(self) -> list[Any]:
         """All stops until now, the newest last."""
-        while (message := _take(self._stops)) is not None:
+        while (message := self._reader.take(self._stops)) is not None:
             self.stops = [*self.stops[1 - ALL_STOPS :], clean(message)]
         return self.stops
 
@@ -217,13 +219,6 @@ def _ended(result: DriveResult | None) -> str:
     if result is None:
         return "no result yet: the base may still move"
     return f"{result.status.name} ({result.code.name}): {printable(result.message, SENTENCE_LENGTH)}"
-
-
-def _take(subscription: Any) -> Any:
-    """The newest message that waits, deserialized; None: none does."""
-    with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-    return None if taken is None else taken[0]
 
 
 def _unused(message: Any) -> None:

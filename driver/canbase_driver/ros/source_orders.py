@@ -24,6 +24,7 @@ from canbase_config.mux import JOINTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import EventEntry, Recording
 from canbase_runtime.joint_command import BaseVelocity, base_velocity
+from canbase_runtime.message_reader import MessageReader
 
 NODE = "motor_driver_black_box"
 ORDER = "order"
@@ -32,8 +33,6 @@ FASTEST_HZ = 50.0
 """A source that publishes faster is kept for a shorter time than `black_box.seconds`."""
 MOST_KEPT = 2000
 """Of each source."""
-_UNREADABLE = (rclpy_implementation.RCLError, UnicodeDecodeError)
-"""Bytes that are no message of this type."""
 
 
 class SourceOrders:
@@ -42,6 +41,7 @@ class SourceOrders:
     def __init__(self, beside: Node, robot: Robot, seconds: float) -> None:
         """`seconds`: how far a recording goes back."""
         self._robot = robot
+        self._reader = MessageReader()
         depth = min(MOST_KEPT, math.ceil(seconds * FASTEST_HZ))
         qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._depth = depth
@@ -69,11 +69,7 @@ class SourceOrders:
     def _new(self, name: str, subscription: Any, behind_s: float, kept: deque[EventEntry]) -> Iterator[EventEntry]:
         """At most as many as can wait: a source that publishes meanwhile does not hold the recording up."""
         for _ in range(self._depth):
-            try:
-                with subscription.handle:
-                    taken = subscription.handle.take_message(subscription.msg_type, False)
-            except _UNREADABLE:
-                continue
+            taken = self._reader.take_with_times(subscription)
             if taken is None:
                 return
             message, info = taken

@@ -42,7 +42,7 @@ def in_code(source: str, path: str) -> tuple[set[str], set[str], set[str]]:
             topics.add(f"{path} {ast.unparse(call.args[TOPIC_AT[name]])}")
         elif name == "create_service":
             services.add(f"{path} {ast.unparse(call.args[1])}")
-        elif name in READS and "source_orders" not in path:
+        elif name in READS and "message_reader" not in path:
             reads.add(path)
     return topics, services, reads
 
