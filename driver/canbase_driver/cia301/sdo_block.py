@@ -228,6 +228,8 @@ class BlockSdoClient(SdoClient):
 
     def tick(self, now_s: float) -> list[Frame]:
         """As SdoClient, and the segments that are due."""
+        if now_s >= self._ends_s:
+            self._blocks = None
         due = self._blocks.due() if self._blocks else []
         return self._frames(due, now_s) if due else super().tick(now_s)
 

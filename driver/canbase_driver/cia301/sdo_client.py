@@ -19,7 +19,10 @@ _ABORT = 0x80
 LONGEST_TIMEOUT_S, LATE_FACTOR = 5.0, 2.0
 """A server has no time limit (CiA 301): after an answer that came late the client waits this many times as long [s]."""
 MAX_UPLOAD_BYTES = 4096
-"""A drive that sends more than this for one object is not followed any further."""
+"""A drive that sends more than this for one object, in bytes or in segments, is not followed any further."""
+LONGEST_TRANSFER_S = 60.0
+"""From its start, beside the time in which no answer came: a drive that answers without end, or just in time each time,
+is not followed any longer. 4096 bytes take 586 segments, 65,536 bytes in blocks 10 s at 125 kbit/s."""
 
 TOGGLE_BIT_WRONG, TIMED_OUT, COMMAND_UNKNOWN = 0x0503_0000, 0x0504_0000, 0x0504_0001
 OUT_OF_MEMORY, ACCESS_UNSUPPORTED, WRITE_ONLY, READ_ONLY = 0x0504_0005, 0x0601_0000, 0x0601_0001, 0x0601_0002
@@ -151,6 +154,8 @@ class Transfer:
     initiated: bool = False
     toggle: int = 0
     announced: int | None = None
+    segments: int = 0
+    """That came. One may be empty."""
 
 
 @dataclass(slots=True)
@@ -191,6 +196,8 @@ class SdoClient:
         self._attempts = attempts
         self._transfer: Transfer | None = None
         self._answer: bytes | SdoError | None = None
+        self._ends_s = 0.0
+        """When the transfer under way is given up, whatever the drive answers [s]."""
 
     @property
     def busy(self) -> bool:
@@ -219,6 +226,7 @@ class SdoClient:
         if self._transfer is not None:
             raise RuntimeError(f"node {self.node_id}: {self._transfer.step} is under way; wait for its answer")
         self._answer = None
+        self._ends_s = self._end_s(now_s)
         self._repeated = False
         self._addresses.add(address(step))
         if isinstance(step, Write):
@@ -230,6 +238,7 @@ class SdoClient:
         if self._transfer is None:
             raise RuntimeError(f"node {self.node_id}: no transfer is under way")
         self._repeated = True
+        self._ends_s = self._end_s(now_s)
         return self._begin(self._transfer.step, self._attempts, now_s)
 
     def answer(self) -> bytes:
@@ -245,9 +254,11 @@ class SdoClient:
 
     def tick(self, now_s: float) -> list[Frame]:
         """Let time pass: a transfer without an answer is aborted, then tried again or given up."""
-        if self._transfer is None or now_s < self._transfer.deadline:
+        if self._transfer is None:
             return []
-        return self._fail(self._transfer, TIMED_OUT, now_s)
+        if now_s >= self._ends_s:
+            return self._give_up(self._transfer.step)
+        return [] if now_s < self._transfer.deadline else self._fail(self._transfer, TIMED_OUT, now_s)
 
     def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         """Take a frame from the bus; frames of other nodes and services are none of our business."""
@@ -330,7 +341,8 @@ class SdoClient:
 
     def _on_uploaded(self, transfer: Transfer, data: bytes, now_s: float) -> list[Frame]:
         transfer.buffer += data[1 : 8 - (data[0] >> 1 & 0x07)]
-        if len(transfer.buffer) > MAX_UPLOAD_BYTES:
+        transfer.segments += 1
+        if max(len(transfer.buffer), transfer.segments) > MAX_UPLOAD_BYTES:
             return self._fail(transfer, OUT_OF_MEMORY, now_s)
         if not data[0] & 0x01:
             return [self._request(transfer, bytes((0x60 | transfer.toggle << 4,)), now_s)]
@@ -352,6 +364,13 @@ class SdoClient:
             return [abort, self._begin(step, transfer.attempts_left, now_s)]
         self._finish(self._timeout(step) if code == TIMED_OUT else SdoAborted(self.node_id, step, code))
         return [abort]
+
+    def _end_s(self, now_s: float) -> float:
+        return now_s + LONGEST_TRANSFER_S + self._attempts * self._timeout_s
+
+    def _give_up(self, step: Read | Write) -> list[Frame]:
+        self._finish(SdoTimeout(self.node_id, step, f"not finished after {LONGEST_TRANSFER_S:g} s, though the drive answers"))
+        return [self._abort_frame(step, TIMED_OUT)]
 
     def _abort_frame(self, step: Read | Write, code: int) -> Frame:
         return Frame(SDO_TO_SERVER + self.node_id, bytes((_ABORT,)) + address(step) + code.to_bytes(4, "little"))
