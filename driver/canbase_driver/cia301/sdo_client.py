@@ -369,7 +369,8 @@ class SdoClient:
         return now_s + LONGEST_TRANSFER_S + self._attempts * self._timeout_s
 
     def _give_up(self, step: Read | Write) -> list[Frame]:
-        self._finish(SdoTimeout(self.node_id, step, f"not finished after {LONGEST_TRANSFER_S:g} s, though the drive answers"))
+        text = f"not finished after {LONGEST_TRANSFER_S:g} s, though the drive answers"
+        self._finish(SdoTimeout(self.node_id, step, text))
         return [self._abort_frame(step, TIMED_OUT)]
 
     def _abort_frame(self, step: Read | Write, code: int) -> Frame:
