@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from canbase_config import reserves
+from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import PROFILE_SCHEMA
 from canbase_config.robot import Robot
 from canbase_config.schema import Schema, Shape, kind_of
@@ -34,9 +36,41 @@ the `generic` profile. How to write one: [drives.md](drives.md).
 _ROW: Final = "| {} | {} | {} | {} |"
 
 
+_RESERVES: Final = """\
+## Keys that depend on each other
+
+A timeout must allow for one lost message: two periods, plus the time by which a message may be late. An encoder must
+be fine enough for the tolerance that it is compared with. A file in which a key is less than *at least* is refused, and
+the message names the least value that is accepted. *Sample*: the value of the bench robot, and the least one for it.
+
+| key | is for | at least | sample |
+|---|---|---|---|
+"""
+
+
+def _reserves() -> str:
+    robot = load_robot(sample("bench")).robot
+    rows = [
+        _ROW.format(f"`{row.key}`", _cell(row.waits_for), _cell(row.rule), _figures(robot, row))
+        for row in reserves.RESERVES
+    ]
+    return _RESERVES + "\n".join((*rows, ""))
+
+
+def _figures(robot: Robot, row: reserves.Reserve) -> str:
+    given = min(reserves.at(robot, loc) for loc in row.keys(robot))
+    return f"{given:g}, least {row.least(robot):.3g}"
+
+
 def configuration_page() -> str:
     """The whole of docs/configuration.md."""
-    parts = [_HEAD, *_tables(Schema(Robot), "robot.yaml"), _PROFILE_HEAD, *_tables(PROFILE_SCHEMA, "profile")]
+    parts = [
+        _HEAD,
+        _reserves(),
+        *_tables(Schema(Robot), "robot.yaml"),
+        _PROFILE_HEAD,
+        *_tables(PROFILE_SCHEMA, "profile"),
+    ]
     return "\n".join(parts)
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
-from canbase_config import bus_load, drive_values, stopping, units
+from canbase_config import bus_load, drive_values, reserves, stopping, units
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.commissioned import Commissioned
@@ -31,8 +31,6 @@ REMOTE = 0x4000_0000
 """linux/can.h, CAN_RTR_FLAG: above an identifier, in a filter of the kernel."""
 DRIVER_NODE_ID = 127
 """CANopen node id of the motor driver: its heartbeat is COB-ID 77Fh."""
-CYCLES_PER_TIMEOUT = 4
-"""What comes once a control cycle, or is sent from it, may be late or lost once or twice without a stop."""
 WATCHDOG_NODE_ID = 126
 """CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
 LONGEST_STOP_S = 20.0
@@ -249,16 +247,8 @@ class Robot(Section):
         return self
 
     @model_validator(mode="after")
-    def _timeouts_span_cycles(self) -> Robot:
-        least_s = CYCLES_PER_TIMEOUT / self.rates.control_hz
-        for key in ("feedback_s", "drive_heartbeat_s"):
-            timeout_s = getattr(self.timeouts, key)
-            if timeout_s < least_s - 1e-9:
-                message = (
-                    f"{key} ({timeout_s:g}) is shorter than {CYCLES_PER_TIMEOUT} control cycles: "
-                    f"at least {least_s:g} with rates.control_hz {self.rates.control_hz:g}"
-                )
-                raise MisfitError(message, ("timeouts", key), ("rates", "control_hz"))
+    def _keys_have_their_reserves(self) -> Robot:
+        reserves.check(self)
         return self
 
     @model_validator(mode="after")

@@ -5,12 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
 from campaign import soak
 from campaign.soak import Driven, drive_all, told
 from canbase_campaign.ordinary import OrdinaryHour
+from canbase_campaign.robots import DrawnRobot, at_edges, draw_robot
+from canbase_config.reserves import RESERVES
+from canbase_config.robot import Robot
+from canbase_config.stopping import max_wheel_mps
+from canbase_config.units import m_per_count
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
 
@@ -30,6 +36,36 @@ def test_robots_that_were_stopped_once_are_not_any_more(seed: int, seconds: floa
     """
     (driven,) = drive_all(range(seed, seed + 1), seconds, 1)
     assert driven.trip is None, told(driven.trip)
+
+
+def with_coarse_encoders(number: int) -> DrawnRobot:
+    """Slow, at 200 cycles a second, and as coarse as the widest tolerance of its travel allows: an increment is more
+    than three times what its fastest wheel does in two cycles."""
+    drawn = draw_robot(number)
+    values = drawn.robot.model_dump()
+    values["rates"]["control_hz"] = 200.0
+    values["watchdog"]["motion_missing_m"] = 0.1
+    for key in ("linear_mps", "angular_radps"):
+        values["limits"][key] *= 0.3
+    rows = [row for row in RESERVES if row.key == "watchdog.motion_missing_m"]
+    return replace(drawn, robot=at_edges(Robot.model_validate(values), rows))
+
+
+@pytest.mark.parametrize("number", [2, 3, 5])
+def test_a_slow_robot_with_coarse_encoders_is_not_stopped(number: int) -> None:
+    drawn = with_coarse_encoders(number)
+    robot = drawn.robot
+    increment_m = abs(m_per_count(robot.drives[0], robot.base.wheel_radius_m))
+    assert increment_m > 6.0 * max_wheel_mps(robot) / robot.rates.control_hz
+    trip = OrdinaryHour(number, drawn=drawn).run(8.0)
+    assert trip is None, told(trip)
+
+
+@pytest.mark.parametrize("number", [1, 4, 7])
+def test_a_robot_with_all_keys_at_the_edges_of_what_is_accepted_is_not_stopped(number: int) -> None:
+    drawn = draw_robot(number)
+    trip = OrdinaryHour(number, drawn=replace(drawn, robot=at_edges(drawn.robot))).run(8.0)
+    assert trip is None, told(trip)
 
 
 def test_a_loaded_robot_has_double_payload_and_is_never_on_a_level_floor() -> None:

@@ -6,6 +6,7 @@ stated decelerations with its load on its slope, and without power it rolls out 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import lru_cache
 from math import ceil
@@ -16,8 +17,10 @@ from pydantic import ValidationError
 
 from canbase_config import bus_load
 from canbase_config.commissioned import STEPS, Commissioned, mark
+from canbase_config.errors import Loc
 from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import load_profile
+from canbase_config.reserves import COUNTS, RESERVES, Reserve, at, rounded_up
 from canbase_config.robot import Robot
 from canbase_sim.plant.base import PlantParameters
 
@@ -34,6 +37,10 @@ FRICTION_LEFT = 0.6
 CREEP_SHARE = 0.45
 """Of the rated torque: friction and slope take no more of a wheel that just turns. docs/bus.md demands half."""
 TRIES = 100
+EDGE_EVERY = 8
+"""One robot of so many has every timeout as short, and its encoders as coarse, as `canbase config check` accepts."""
+LEAST_TIMEOUT_S = 0.05
+"""The ranges of timeouts begin there."""
 BITRATES = (125_000, 250_000, 500_000, 1_000_000)
 STOP_THEMSELVES = ("generic", "epos4", "nanotec", "elmo_gold", "kinco", "technosoft", "inverter")
 """Kinds whose drives stop when their masters die: 1016h or node guarding, with 6007h."""
@@ -78,8 +85,44 @@ def draw_robot(number: int, payload: float | None = None) -> DrawnRobot:
         except ValidationError:
             continue
         if bitrates(robot):
-            return _with_body(number, robot, random, payload)
+            edged = at_edges(robot) if number % EDGE_EVERY == EDGE_EVERY - 1 else robot
+            return _with_body(number, edged, random, payload)
     raise RuntimeError(f"robot {number}: none of {TRIES} drawn files passes robot.yaml's checks")
+
+
+def at_edges(robot: Robot, rows: Sequence[Reserve] = RESERVES) -> Robot:
+    """The same robot with each of these keys at the least value that its file may have; its encoders are as coarse as
+    their tolerances allow. What another row demands then is raised to that row's least value."""
+    coarse = _coarsened(robot, [row for row in rows if COUNTS in row.others])
+    values = coarse.model_dump()
+    for row in rows:
+        if COUNTS not in row.others:
+            for loc in row.keys(coarse):
+                _set(values, loc, LEAST_TIMEOUT_S)
+    for row in RESERVES:
+        least = rounded_up(row.least(coarse))
+        for loc in row.keys(coarse):
+            _set(values, loc, max(least, at(values, loc)))
+    return commissioned(Robot.model_validate(values))
+
+
+def _coarsened(robot: Robot, rows: Sequence[Reserve]) -> Robot:
+    """With fewer increments for each motor revolution, so that the first of these tolerances is just met."""
+    if not rows:
+        return robot
+    share = max(row.least(robot) / at(robot, loc) for row in rows for loc in row.keys(robot))
+    drives = [
+        drive.model_copy(update={"counts_per_motor_rev": ceil(drive.counts_per_motor_rev * share)})
+        for drive in robot.drives
+    ]
+    return robot.model_copy(update={"drives": tuple(drives)})
+
+
+def _set(values: dict[str, Any], loc: Loc, value: float) -> None:
+    section = values
+    for part in loc[:-1]:
+        section = section[str(part)]
+    section[str(loc[-1])] = value
 
 
 def commissioned(robot: Robot) -> Robot:

@@ -24,6 +24,8 @@ scale that is a little wrong have no memory. An error of more than travel_tolera
 JUMP_FACTOR = 3.0
 """A step of the encoder beyond this many times the fastest wheel's is a jump: it is no evidence of motion."""
 JUMP_CYCLES = 2.0
+JUMP_COUNTS = 2
+"""... and of more increments than these, however coarse they are: a slow wheel shows one of them in one cycle."""
 BUNCHED = 0.5
 """Samples after fewer periods waited while this process was late: only the sum of their times is evidence."""
 SWING_SHARE, SWING_S = 0.08, 0.3
@@ -55,7 +57,8 @@ class Plausibility:
         self._falls_mps2 = config.deceleration_mps2
         self._m_per_count = drive.m_per_count
         self._fixed_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
-        self._jump_mps, self._jump_s = JUMP_FACTOR * config.max_wheel_mps, JUMP_CYCLES / config.control_hz
+        self._jump_mps = JUMP_FACTOR * config.max_wheel_mps
+        self._least_jump_m = max(self._jump_mps * JUMP_CYCLES / config.control_hz, JUMP_COUNTS * abs(drive.m_per_count))
         self._fastest_mps = config.overspeed_factor * config.max_wheel_mps
         self._forward, self._backward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._ahead, self._behind = Overshoot(), Overshoot()
@@ -157,7 +160,7 @@ class Plausibility:
         if self._counts is None or self._counts_before is None or self._gap:
             return None, False
         step_m = difference(self._counts, self._counts_before) * self._m_per_count
-        return step_m, abs(step_m) > self._jump_mps * max(elapsed_s, self._jump_s)
+        return step_m, abs(step_m) > max(self._jump_mps * elapsed_s, self._least_jump_m)
 
     def _drift(self, velocity_mps: float, step_m: float | None, jumped: bool, elapsed_s: float) -> float:
         """Travel by velocity minus travel by encoder [m]. A jump is no travel; without a step it starts again."""

@@ -211,13 +211,14 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "feedback that is shorter than a few cycles": (
         {END: "timeouts: {feedback_s: 0.039}"},
-        ":36: timeouts.feedback_s: feedback_s (0.039) is shorter than 4 control cycles: "
-        "at least 0.04 with rates.control_hz 100",
+        ":36: timeouts.feedback_s: timeouts.feedback_s (0.039) is too little for a status TPDO after each SYNC: "
+        "at least 0.05 (4 / rates.control_hz + 0.01), or change rates.control_hz",
     ),
     "cycles that are longer than a few heartbeats": (
-        {END: "rates: {control_hz: 20.0}\ntimeouts: {feedback_s: 0.2, drive_heartbeat_s: 0.19}"},
-        ":37: timeouts.drive_heartbeat_s: drive_heartbeat_s (0.19) is shorter than 4 control cycles: "
-        "at least 0.2 with rates.control_hz 20",
+        {END: "rates: {control_hz: 20.0}\ntimeouts: {feedback_s: 0.21, drive_heartbeat_s: 0.19}"},
+        ":37: timeouts.drive_heartbeat_s: timeouts.drive_heartbeat_s (0.19) is too little for heartbeats at the "
+        "drives, 3 in this time, each sent in a control cycle: at least 0.21 (4 / rates.control_hz + 0.01), or change "
+        "rates.control_hz",
     ),
     "a key that is a number": (
         {4: "  extra: {1: 2}"},

@@ -99,7 +99,7 @@ def test_a_bus_without_filters_in_the_kernel_has_none_and_the_integrators_own_go
         ("{}", 100.0, 50.0),
         ("{profile: standard}", 100.0, 50.0),
         ("{profile: small_computer}", 50.0, 25.0),
-        ("{profile: small_computer, odometry_hz: 10.0}", 50.0, 10.0),
+        ("{profile: small_computer, odometry_hz: 20.0}", 50.0, 20.0),
         ("{control_hz: 80.0, profile: small_computer}", 80.0, 25.0),
     ],
 )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from canbase_config.effective import effective
 from canbase_config.load import Loaded, leaf_keys, load_robot
-from canbase_config.robot import CYCLES_PER_TIMEOUT, Robot
+from canbase_config.robot import Robot
 
 Values = dict[str, Any]
 
@@ -94,17 +94,29 @@ def made_consistent(values: Values) -> Values:
         action[f"min_{what}"] = min(action.get(f"min_{what}", 0.01), 0.4)
     action["spin_speed_radps"] = max(action.get("spin_speed_radps", 1.0), 0.4)
     action.pop("require_client_lease", None)  # not together with nav2_behaviors
-    least_s = CYCLES_PER_TIMEOUT / values.get("rates", {}).get("control_hz", 100.0)
-    timeouts = values.setdefault("timeouts", {})
-    timeouts.pop("standstill_s", None)
-    for key in ("feedback_s", "drive_heartbeat_s"):
-        timeouts[key] = max(timeouts.get(key, 0.1), least_s)
+    make_long_enough(values)
     for extra in ("interface", "channel", "bitrate"):
         values["bus"].get("extra", {}).pop(extra, None)
     make_mux_consistent(values.get("mux", {}))
     make_ordered(values.get("health") or {}, "voltage_low_v", "voltage_high_v")
     make_ordered(values.get("battery") or {}, "empty_v", "full_v")
     return values
+
+
+def make_long_enough(values: Values) -> None:
+    """Timeouts and tolerances that allow for the slowest rates, and encoders that are fine enough for the latter."""
+    timeouts, watchdog = values.setdefault("timeouts", {}), values.setdefault("watchdog", {})
+    timeouts.pop("standstill_s", None)
+    timeouts |= {"command_s": 0.3, "lease_s": 0.3, "watchdog_s": 0.3, "feedback_s": 0.3, "odometry_s": 1.0}
+    timeouts["drive_heartbeat_s"] = max(timeouts.get("drive_heartbeat_s", 0.3), 0.8)
+    values["safety"]["command_timeout_s"] = 0.3
+    rates = values.setdefault("rates", {})
+    rates["odometry_hz"] = max(rates.get("odometry_hz", 50.0), 3.0)
+    watchdog |= {"travel_tolerance_m": 0.5, "motion_missing_m": 0.1}
+    values["base"]["wheel_radius_m"] = min(values["base"]["wheel_radius_m"], 0.1)
+    for drive in values["drives"]:
+        drive["gear_ratio"] = max(drive["gear_ratio"], 1.0)
+        drive["counts_per_motor_rev"] = max(drive["counts_per_motor_rev"], 100)
 
 
 def make_ordered(section: Values, low: str, high: str) -> None:

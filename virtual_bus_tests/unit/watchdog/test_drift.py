@@ -148,6 +148,16 @@ def test_of_a_slower_base_a_shorter_step_is_a_jump(step_m: float, jump: bool) ->
     assert (abs(wheel.sample(0.0, 0.0).drift_m) < 0.001) is jump
 
 
+@pytest.mark.parametrize(("increments", "jump"), [(1, False), (2, False), (3, True), (-2, False), (-3, True)])
+def test_one_or_two_increments_are_no_jump_however_coarse_they_are(increments: int, jump: bool) -> None:
+    """25 mm each, on a base of 0.3 m/s: three times its fastest wheel goes 18 mm in two cycles."""
+    watch = Plausibility(replace(CONFIG.drives[0], m_per_count=0.025), replace(CONFIG, max_wheel_mps=0.3), 0.0)
+    for counts, now_s in ((0, 1.0), (increments, 1.01)):
+        watch.on_position(counts)
+        watch.on_velocity(0.0, True, True, now_s)
+    assert (watch.last.drift_m == 0.0) is jump
+
+
 def test_the_farthest_jump_is_one() -> None:
     wheel = Wheel()
     wheel.watch.on_position(-(2**31))

@@ -1,0 +1,175 @@
+"""Keys of robot.yaml that depend on each other, as one table: how long a timeout has to be for what it waits for, and
+how fine an encoder for the tolerance that it is compared with.
+
+`canbase config check` refuses a file by it, docs/configuration.md shows it, and the campaign draws robots at its edges.
+Pure. A timeout allows for one lost message: two periods, plus the time by which a message may be late.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from canbase_config.section import MisfitError
+from canbase_config.units import m_per_count
+from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT, STATE_PERIOD_S
+
+if TYPE_CHECKING:
+    from canbase_config.errors import Loc
+    from canbase_config.robot import Robot
+
+TOPIC_LATE_S: Final = 0.05
+"""A message between two processes may be late by this, on a computer that does other things too [s]."""
+GOAL_LATE_S: Final = 0.1
+"""The same for the action server, whose priority is the lowest [s]."""
+STATE_LATE_S: Final = 0.02
+"""The same for a frame of the watchdog, beside the control cycle that reads it [s]."""
+FEEDBACK_LATE_S: Final = 0.01
+"""The same for what the driver's SYNC triggers, beside a cycle of the sender and one of the receiver [s]."""
+COUNTS_PER_TRAVEL: Final = 4.0
+"""Encoder and measured velocity differ by one increment at the begin and one at the end of a window, and by slip."""
+COUNTS_OF_LIFE: Final = 8.0
+"""Two increments are a sign of life, the first may be a whole one away, and a wheel lags its setpoint meanwhile."""
+ACTION_TOPIC: Final = "cmd_vel_action"
+ROUNDING: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Reserve:
+    """One key that must not be less than others demand.
+
+    `rule`: the least value, as somebody who writes robot.yaml computes it. `others`: the keys in it. `keys`: where
+    `key` is in this robot's file; several where it has a name in it.
+    """
+
+    key: str
+    waits_for: str
+    rule: str
+    others: tuple[str, ...]
+    least: Callable[[Robot], float]
+    keys: Callable[[Robot], Iterable[Loc]]
+
+
+def _action_sources(robot: Robot) -> Iterable[Loc]:
+    for name, source in robot.mux.sources.items():
+        if source.topic.removeprefix("/") == ACTION_TOPIC:
+            yield "mux", "sources", name, "timeout_s"
+
+
+def _row(key: str, waits_for: str, rule: str, others: tuple[str, ...], least: Callable[[Robot], float]) -> Reserve:
+    return Reserve(key, waits_for, rule, others, least, lambda _robot: (tuple(key.split(".")),))
+
+
+def _increments_m(robot: Robot, number: float) -> float:
+    """Travel of the rim with the coarsest encoder for so many increments [m]."""
+    return number * max(abs(m_per_count(drive, robot.base.radius_m(drive.side))) for drive in robot.drives)
+
+
+def _commands_s(robot: Robot) -> float:
+    return 2.0 / robot.rates.command_hz + TOPIC_LATE_S
+
+
+def _cycles_s(robot: Robot) -> float:
+    return 4.0 / robot.rates.control_hz + FEEDBACK_LATE_S
+
+
+_COMMANDS: Final = f"2 / rates.command_hz + {TOPIC_LATE_S:g}"
+_CYCLES: Final = f"4 / rates.control_hz + {FEEDBACK_LATE_S:g}"
+_INCREMENT: Final = "2π × base.wheel_radius_m / (drives.gear_ratio × drives.counts_per_motor_rev)"
+COUNTS: Final = "drives.counts_per_motor_rev"
+
+RESERVES: Final = (
+    _row("timeouts.command_s", "cmd_vel at the driver", _COMMANDS, ("rates.command_hz",), _commands_s),
+    _row("timeouts.lease_s", "the leases at the watchdog", _COMMANDS, ("rates.command_hz",), _commands_s),
+    _row("safety.command_timeout_s", "cmd_vel_mux at the filter", _COMMANDS, ("rates.command_hz",), _commands_s),
+    Reserve(
+        "mux.sources.….timeout_s",
+        f"{ACTION_TOPIC}, where that is its topic, at the mux",
+        f"2 / action.control_hz + {GOAL_LATE_S:g}",
+        ("action.control_hz",),
+        lambda robot: 2.0 / robot.action.control_hz + GOAL_LATE_S,
+        _action_sources,
+    ),
+    _row(
+        "timeouts.odometry_s",
+        "odom at the action server; from one to the next are whole control cycles",
+        f"2 / rates.odometry_hz + 2 / rates.control_hz + {TOPIC_LATE_S:g}",
+        ("rates.odometry_hz", "rates.control_hz"),
+        lambda robot: 2.0 / robot.rates.odometry_hz + 2.0 / robot.rates.control_hz + TOPIC_LATE_S,
+    ),
+    _row(
+        "timeouts.watchdog_s",
+        f"the state frame of the watchdog, every {STATE_PERIOD_S:g} s, at the driver",
+        f"2 × {STATE_PERIOD_S:g} + 1 / rates.control_hz + {STATE_LATE_S:g}",
+        ("rates.control_hz",),
+        lambda robot: 2.0 * STATE_PERIOD_S + 1.0 / robot.rates.control_hz + STATE_LATE_S,
+    ),
+    _row("timeouts.feedback_s", "a status TPDO after each SYNC", _CYCLES, ("rates.control_hz",), _cycles_s),
+    _row(
+        "timeouts.drive_heartbeat_s",
+        f"heartbeats at the drives, {HEARTBEATS_PER_TIMEOUT} in this time, each sent in a control cycle",
+        _CYCLES,
+        ("rates.control_hz",),
+        _cycles_s,
+    ),
+    _row(
+        "timeouts.drive_heartbeat_s",
+        "the watchdog's heartbeats, when its loop is as late as watchdog.loop_late_s allows",
+        "1.5 × watchdog.loop_late_s",
+        ("watchdog.loop_late_s",),
+        lambda robot: HEARTBEATS_PER_TIMEOUT / (HEARTBEATS_PER_TIMEOUT - 1) * robot.watchdog.loop_late_s,
+    ),
+    _row(
+        "watchdog.travel_tolerance_m",
+        "the encoder beside the measured velocity",
+        f"{COUNTS_PER_TRAVEL:g} increments of the coarsest encoder, each {_INCREMENT}",
+        (COUNTS,),
+        lambda robot: _increments_m(robot, COUNTS_PER_TRAVEL),
+    ),
+    _row(
+        "watchdog.motion_missing_m",
+        "the first sign of life of an encoder that turns",
+        f"{COUNTS_OF_LIFE:g} increments of the coarsest encoder",
+        (COUNTS,),
+        lambda robot: _increments_m(robot, COUNTS_OF_LIFE),
+    ),
+)
+
+
+def check(robot: Robot) -> None:
+    """Raises MisfitError for the first row that does not hold, with the least value that would."""
+    for row in RESERVES:
+        least = row.least(robot)
+        for loc in row.keys(robot):
+            given = at(robot, loc)
+            if given < least - ROUNDING:
+                raise MisfitError(_sentence(row, given, least), loc, *_locs(row))
+
+
+def _sentence(row: Reserve, given: float, least: float) -> str:
+    return (
+        f"{row.key} ({given:g}) is too little for {row.waits_for}: at least {rounded_up(least):g} "
+        f"({row.rule}), or change {' or '.join(row.others)}"
+    )
+
+
+def _locs(row: Reserve) -> list[Loc]:
+    """Where else the file may have what is wrong: the key itself may be a default."""
+    return [
+        ("drives", 0, other[7:]) if other.startswith("drives.") else tuple(other.split(".")) for other in row.others
+    ]
+
+
+def rounded_up(value: float) -> float:
+    """To three digits: a value that a person writes, and that passes."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.ceil(value / step - 1e-6) * step
+
+
+def at(section: Any, loc: Loc) -> float:
+    """What the key at `loc` of a robot, or of its values, is."""
+    for part in loc:
+        section = section[part] if isinstance(section, dict) else getattr(section, str(part))
+    return float(section)

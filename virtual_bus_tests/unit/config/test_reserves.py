@@ -1,0 +1,134 @@
+"""Keys that depend on each other: a file is refused just below the least value of each row, with that value."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from canbase_campaign.robots import at_edges, draw_robot
+from canbase_config.errors import Loc
+from canbase_config.load import load_robot, sample
+from canbase_config.reserves import COUNTS, RESERVES, Reserve, at, rounded_up
+from canbase_config.robot import Robot
+
+SLOW: dict[str, Any] = {"control_hz": 20.0, "command_hz": 20.0, "odometry_hz": 5.0}
+FAST: dict[str, Any] = {"control_hz": 200.0, "command_hz": 100.0, "odometry_hz": 100.0}
+"""Rates at both ends of their ranges."""
+NEAR = (1.5, 1.1, 1.01, 1.0001, 1.0, 0.9999, 0.99, 0.9, 0.5)
+
+
+def bench(rates: dict[str, Any], counts: int) -> dict[str, Any]:
+    """The values of the bench robot with these rates, and everything else long and wide enough for them."""
+    values = load_robot(sample("bench")).robot.model_dump()
+    values["rates"] |= rates
+    values["drives"] = [{**drive, "counts_per_motor_rev": counts} for drive in values["drives"]]
+    values["timeouts"] |= dict.fromkeys(("command_s", "lease_s", "feedback_s", "watchdog_s"), 0.5)
+    values["timeouts"] |= {"drive_heartbeat_s": 1.0, "odometry_s": 1.0}
+    values["watchdog"] |= {"travel_tolerance_m": 0.5, "motion_missing_m": 0.1}
+    values["safety"]["command_timeout_s"] = 0.5
+    return values
+
+
+def put(values: dict[str, Any], loc: Loc, value: float) -> None:
+    for part in loc[:-1]:
+        values = values[part]  # type: ignore[index]
+    values[loc[-1]] = value  # type: ignore[index]
+
+
+def in_range(key: str, value: float) -> bool:
+    """Whether the range of the key itself, which is checked before, allows it."""
+    low = {"watchdog.motion_missing_m": 0.001, "watchdog.travel_tolerance_m": 0.005, "timeouts.feedback_s": 0.02}
+    return value >= low.get(key, 0.05)
+
+
+@pytest.mark.parametrize("rates", [SLOW, FAST], ids=["slow", "fast"])
+@pytest.mark.parametrize("counts", [6, 30])
+@pytest.mark.parametrize("row", RESERVES, ids=lambda row: f"{row.key} {row.others[0]}")
+def test_a_file_passes_down_to_the_least_value_of_each_row_and_no_further(
+    row: Reserve, counts: int, rates: dict[str, Any]
+) -> None:
+    values = bench(rates, counts)
+    robot = Robot.model_validate(values)
+    (loc,) = row.keys(robot)
+    needed = max(other.least(robot) for other in RESERVES if loc in other.keys(robot))
+    for share in NEAR:
+        given = needed * share
+        if not in_range(row.key, given):
+            continue
+        put(values, loc, given)
+        if share >= 1.0:
+            Robot.model_validate(values)
+        else:
+            with pytest.raises(ValidationError, match=f"{row.key} .* is too little for"):
+                Robot.model_validate(values)
+
+
+@pytest.mark.parametrize("row", RESERVES, ids=lambda row: f"{row.key} {row.others[0]}")
+def test_the_value_that_the_message_names_is_accepted_and_it_is_the_least_one(row: Reserve) -> None:
+    for cycles in (20.0, 37.0, 100.0, 173.0, 200.0):
+        values = bench({"control_hz": cycles, "command_hz": 33.0, "odometry_hz": 7.0}, counts=6)
+        robot = Robot.model_validate(values)
+        (loc,) = row.keys(robot)
+        needed = max(other.least(robot) for other in RESERVES if loc in other.keys(robot))
+        named = rounded_up(needed)
+        assert needed <= named + 1e-9
+        assert named <= 1.011 * needed
+        put(values, loc, max(named, 0.05) if row.key.endswith("_s") else named)
+        Robot.model_validate(values)
+
+
+def test_the_least_values_of_the_sample_robot() -> None:
+    robot = load_robot(sample("bench")).robot
+    least = {(row.key, row.others[0]): row.least(robot) for row in RESERVES}
+    increment_m = math.tau * robot.base.wheel_radius_m / (robot.drives[0].gear_ratio * 4096)
+
+    assert least == pytest.approx(
+        {
+            ("timeouts.command_s", "rates.command_hz"): 0.09,
+            ("timeouts.lease_s", "rates.command_hz"): 0.09,
+            ("safety.command_timeout_s", "rates.command_hz"): 0.09,
+            ("mux.sources.….timeout_s", "action.control_hz"): 0.14,
+            ("timeouts.odometry_s", "rates.odometry_hz"): 0.11,
+            ("timeouts.watchdog_s", "rates.control_hz"): 0.13,
+            ("timeouts.feedback_s", "rates.control_hz"): 0.05,
+            ("timeouts.drive_heartbeat_s", "rates.control_hz"): 0.05,
+            ("timeouts.drive_heartbeat_s", "watchdog.loop_late_s"): 0.15,
+            ("watchdog.travel_tolerance_m", COUNTS): 4.0 * increment_m,
+            ("watchdog.motion_missing_m", COUNTS): 8.0 * increment_m,
+        }
+    )
+
+
+def test_encoders_of_twelve_increments_on_a_wheel_without_gear_are_refused_with_the_tolerance_that_fits() -> None:
+    values = load_robot(sample("bench")).robot.model_dump()
+    values["drives"] = [{**drive, "counts_per_motor_rev": 12, "gear_ratio": 1.0} for drive in values["drives"]]
+
+    with pytest.raises(ValidationError, match=r"travel_tolerance_m \(0.05\) is too little .* at least 0\.\d+"):
+        Robot.model_validate(values)
+
+
+def test_a_source_of_another_topic_may_have_any_timeout() -> None:
+    values = load_robot(sample("bench")).robot.model_dump()
+    values["mux"]["sources"]["joystick"]["timeout_s"] = 0.05
+    Robot.model_validate(values)
+
+    values["mux"]["sources"]["action"]["timeout_s"] = 0.139
+    with pytest.raises(ValidationError, match=r"cmd_vel_action, where that is its topic, at the mux: at least 0\.14 "):
+        Robot.model_validate(values)
+    values["mux"]["sources"]["action"]["topic"] = "cmd_vel_other"
+    Robot.model_validate(values)
+
+
+@pytest.mark.parametrize("number", range(24))
+def test_a_drawn_robot_with_all_keys_at_their_edges_is_one_that_the_check_accepts(number: int) -> None:
+    robot = at_edges(draw_robot(number).robot)
+
+    for row in RESERVES:
+        for loc in row.keys(robot):
+            assert row.least(robot) <= at(robot, loc) + 1e-9
+    coarse = [row for row in RESERVES if COUNTS in row.others]
+    used = max(row.least(robot) / at(robot, loc) for row in coarse for loc in row.keys(robot))
+    assert 0.3 < used <= 1.0 + 1e-6  # as coarse as whole increments allow
