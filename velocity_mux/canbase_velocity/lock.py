@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -44,7 +45,7 @@ class Lock:
         self.name = name
         self.config = config
         self._locked = False
-        self._at_s: float | None = None
+        self._at_s = -math.inf
         self._crowd = ""
 
     def published_by(self, nodes: Sequence[str]) -> None:
@@ -63,7 +64,7 @@ class Lock:
             return LockStanding.SHARED
         if not self.config.required:
             return LockStanding.FREE
-        if self._at_s is None:
+        if self._at_s == -math.inf:
             return LockStanding.NEVER_RECEIVED
         return LockStanding.FREE if now_s - self._at_s <= self.config.timeout_s else LockStanding.SILENT
 
@@ -76,12 +77,12 @@ class Lock:
         standing = self.standing(now_s)
         if standing is LockStanding.FREE:
             return ""
-        age_s = now_s - (self._at_s or 0.0)
+        age_s, timeout_s = now_s - self._at_s, self.config.timeout_s
         return {
             LockStanding.LOCKED: "holds",
             LockStanding.SHARED: f"has {self._crowd}",
             LockStanding.NEVER_RECEIVED: f"has published nothing yet on {self.config.topic}",
-            LockStanding.SILENT: f"has published nothing for {age_s:.2f} s (timeout {self.config.timeout_s:.2f} s)",
+            LockStanding.SILENT: f"has published nothing for {age_s:.2f} s (timeout {timeout_s:.2f} s)",
         }[standing]
 
     def view(self, now_s: float) -> LockView:
@@ -92,7 +93,7 @@ class Lock:
             priority=self.config.priority,
             standing=self.standing(now_s),
             required=self.config.required,
-            age_s=None if self._at_s is None else now_s - self._at_s,
+            age_s=None if self._at_s == -math.inf else now_s - self._at_s,
             timeout_s=self.config.timeout_s,
             reason=self.reason(now_s),
         )

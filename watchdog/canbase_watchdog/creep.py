@@ -24,7 +24,7 @@ class CreepWatch:
         """`order_hold_s` from `config`: the longest way of an order to the driver, and its ramp's rounding."""
         self._hold_s = config.order_hold_s
         self._ordered_s = 0.0
-        self._ordered_at = self._looked_at = -math.inf
+        self._ordered_at = self._looked_at = math.inf
         self._ordered = False
         """At the last look."""
 

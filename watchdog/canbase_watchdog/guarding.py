@@ -35,7 +35,7 @@ class GuardAnswers:
 
     def __init__(self) -> None:
         """The first answer counts, whatever its toggle bit: it may have answered a watchdog before this one."""
-        self._toggle = -1
+        self._toggle: int | None = None
 
     def take(self, data: bytes) -> bytes | None:
         """The heartbeat that the answer stands for; None: it counts as not received."""
@@ -44,7 +44,7 @@ class GuardAnswers:
             return None
         state, toggle = answer
         if state == frames.BOOT_UP:
-            self._toggle = -1
+            self._toggle = None
             return state
         if toggle == self._toggle:
             return None

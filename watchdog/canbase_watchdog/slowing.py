@@ -62,7 +62,7 @@ class SlowingWatch:
         self._slope, self._since = slope, since
         self._window_s = slope.window_s
         self._past: deque[tuple[float, float]] = deque()
-        """When, and how high above the line through zero at `since`."""
+        """When, and how high above a line that falls so steeply."""
         self._bad_since, self._bad = math.inf, 0
         self._at = since
         """When the last sample came."""
@@ -81,7 +81,7 @@ class SlowingWatch:
             self._past.clear()
             self._bad = 0
             return
-        level = abs(speed_mps) + self._slope.least_mps2 * (at - self._since)
+        level = abs(speed_mps) + self._slope.least_mps2 * at
         self._past.append((at, level))
         while self._past[0][0] < at - self._window_s - HELD_S:
             self._past.popleft()

@@ -105,8 +105,6 @@ class StateMachine:
             if detail is not None:
                 self._go(row, detail, situation)
                 break
-        if before is Phase.POWER_OFF is not self.phase and situation.shutdown_requested:
-            self._finish()
         return ORDERS[self.phase]
 
     def reset(self) -> None:

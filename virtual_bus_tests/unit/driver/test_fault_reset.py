@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -205,4 +206,58 @@ BREAKS = {
 def test_what_was_well_must_stay_so(phase: ResetPhase, what: str) -> None:
     situation, phases = BREAKS[what]
     outcome = in_phase(phase).run(replace(situation, fault="left: over-current"), 0.01, answer=None)
-    assert (outcome is not None and outcome.sentence.startswith("broken off: ")) is (phase in phases)
+    broken_off = outcome is not None and outcome.sentence.startswith("broken off: ")
+    assert broken_off is (phase in phases)
+    assert not (broken_off and outcome is not None and outcome.done)
+
+
+# Exactly at its limits: from second 8 on, times that a float holds exactly
+
+
+def reset_at_8(answer: int | None = DONE, *, boot_s: float = 8.0, cycle_s: float = 0.125) -> Reset:
+    """A reset since second 8, which has taken one step with this answer."""
+    reset = Reset(8.0, cycle_s, boot_s)
+    assert reset.step(FAULT, answer, 8.0) is None
+    return reset
+
+
+def test_half_a_second_is_not_too_late_for_the_watchdog() -> None:
+    reset = reset_at_8(answer=None)
+    assert reset.step(TRIPPED, None, 8.5) is None
+    assert reset.step(WELL, DONE, 8.5) is None
+    assert reset.phase is ResetPhase.DRIVES
+    assert reset_at_8(answer=None).step(TRIPPED, None, math.nextafter(8.5, 9.0)) is not None
+
+
+def test_the_time_for_a_boot_is_not_too_late_for_a_drive() -> None:
+    waits = Situation(booting="waiting for node 1")
+    reset = reset_at_8(DONE, boot_s=8.0)
+    assert reset.step(waits, None, 16.0) is None
+    assert sentence(reset.step(waits, None, math.nextafter(16.0, 17.0))).startswith("waiting for node 1")
+
+
+# 8 s the drives are there ── 8.375 s the bit, three cycles of 0.125 s later ── 8.75 s low ── 9.75 s a whole second
+def test_an_edge_is_long_enough_at_three_cycles_and_a_fault_may_take_a_second() -> None:
+    reset = reset_at_8()
+    for now_s, phase in (
+        (8.0, ResetPhase.EDGE_LOW),
+        (8.3125, ResetPhase.EDGE_LOW),
+        (8.375, ResetPhase.EDGE_HIGH),
+        (8.75, ResetPhase.FAULTS),
+        (9.75, ResetPhase.FAULTS),
+        (9.8125, ResetPhase.EDGE_LOW),
+    ):
+        assert reset.step(FAULT, None, now_s) is None
+        assert reset.phase is phase, now_s
+
+
+def test_a_fault_is_tried_three_times() -> None:
+    reset, highs = reset_at_8(), 0
+    before = reset.phase
+    for cycle in range(1, 100):
+        outcome = reset.step(FAULT, None, 8.0 + 0.125 * cycle)
+        highs += before is not ResetPhase.EDGE_HIGH is reset.phase
+        before = reset.phase
+        if outcome is not None:
+            break
+    assert (outcome is not None, highs) == (True, 3)

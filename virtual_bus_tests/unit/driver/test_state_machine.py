@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -296,3 +297,73 @@ def test_a_stop_of_before_the_start_is_latched_until_a_reset() -> None:
     state_machine.reset()
     state_machine.step(READY, 200.0)
     assert state_machine.state is ENABLING
+
+
+# Exactly at its limits: times that a float holds exactly
+
+
+def exact(*steps: tuple[float, Situation]) -> StateMachine:
+    """A state machine that has seen these situations at these times [s]."""
+    state_machine = StateMachine(Braking(load_robot(sample("bench")).robot), ramp_timeout_s=3.0)
+    for now_s, situation in steps:
+        state_machine.step(situation, now_s)
+    return state_machine
+
+
+def just_after(now_s: float) -> float:
+    return math.nextafter(now_s, now_s + 1.0)
+
+
+def test_drives_may_take_a_whole_second_to_be_switched_on() -> None:
+    assert exact((8.0, STO_OPEN), (9.0, STO_OPEN)).finding.cause is Cause.PREPARING
+    assert exact((8.0, STO_OPEN), (just_after(9.0), STO_OPEN)).finding.cause is Cause.DRIVE_NOT_READY
+
+
+def test_drives_may_take_two_seconds_to_operation_enabled_and_then_it_is_a_quick_stop() -> None:
+    assert exact((8.0, READY), (10.0, READY)).phase is Phase.ENABLING
+    late = exact((8.0, READY), (just_after(10.0), READY))
+    assert (late.phase, late.finding.cause, late.latches) == (Phase.QUICK_STOP, Cause.ENABLE_TIMEOUT, True)
+
+
+# 8 s enabled ── 9 s stop requested ── 12 s the ramp has had its 3 s
+def test_a_ramp_may_take_its_whole_time() -> None:
+    slow = also(replace(RUNNING, speed_mps=0.0), WRONG["stop requested"])
+    begun = ((8.0, READY), (8.5, RUNNING), (9.0, slow))
+    assert exact(*begun, (12.0, slow)).phase is Phase.RAMP
+    assert exact(*begun, (just_after(12.0), slow)).phase is Phase.QUICK_STOP
+
+
+# 9 s power off ── 9.5 s the drives have had half a second to report it
+def test_drives_have_half_a_second_to_report_that_the_power_is_off() -> None:
+    stop = also(STANDING, WRONG["inactive"])
+    begun = ((8.0, READY), (8.25, STANDING), (8.5, stop), (9.0, stop))
+    assert exact(*begun).phase is Phase.POWER_OFF
+    assert exact(*begun, (9.5, stop)).phase is Phase.POWER_OFF
+    assert exact(*begun, (just_after(9.5), stop)).phase is Phase.DISARMED
+
+
+# 8 s latched ── 20 s reset ── the drives have their whole second to be switched on, not what the stop has left of it
+def test_after_a_reset_the_time_for_the_drives_begins_anew() -> None:
+    state_machine = exact((8.0, WRONG["drive fault"]), (20.0, READY))
+    assert state_machine.phase is Phase.LATCHED
+    state_machine.reset()
+    causes = []
+    for now_s in (20.0, 21.0, 21.25):
+        state_machine.step(STO_OPEN, now_s)
+        causes.append(state_machine.finding.cause)
+    assert causes == [Cause.PREPARING, Cause.PREPARING, Cause.DRIVE_NOT_READY]
+
+
+@pytest.mark.parametrize("powered", [False, True])
+def test_a_shutdown_in_motion_ends_once_the_power_is_off(powered: bool) -> None:
+    """Power off is reported at 9.0 s, or never: then it ends half a second later all the same."""
+    stop = also(STANDING, WRONG["shutdown"])
+    state_machine = exact((8.0, READY), (8.25, STANDING), (8.5, stop), (8.75, stop))
+    assert (state_machine.phase, state_machine.finished) == (Phase.POWER_OFF, False)
+    for cycle in range(200):
+        if state_machine.finished:
+            break
+        state_machine.step(replace(stop, powered=powered), 9.0 + cycle / 128)
+    assert state_machine.finished
+    assert (state_machine.state, state_machine.finding.cause) == (DISARMED, Cause.SHUTDOWN)
+    assert cycle == (35 if powered else 2)

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxLock, MuxSource
-from canbase_runtime.source_standing import SourceStanding
+from canbase_runtime.source_standing import LockStanding, SourceStanding
+from canbase_velocity.lock import crowd
 from canbase_velocity.mux import Mux, MuxDecision
 from canbase_velocity.twist import ZERO, Twist
 from canbase_velocity.unexpected_publishers import Foreign
@@ -205,6 +206,31 @@ def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
     assert decision.twist == ZERO
     (lock,) = decision.locks
     assert (lock.name, lock.holds, lock.age_s, lock.reason) == ("pause", True, 9999.0, "holds")
+
+
+# two nodes publish on one lock: it holds, whatever they say ── one is left, and says that it does not hold
+def test_a_lock_with_two_publishers_holds_and_names_them() -> None:
+    mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
+    mux.on_lock("pause", False, 8.0)
+    mux.on_publishers("pause", ["/panel"])
+    assert [lock.standing for lock in mux.decide(8.0).locks] == [LockStanding.FREE]
+    mux.on_publishers("pause", ["/panel", "/button"])
+    (lock,) = mux.decide(8.5).locks
+    assert (lock.standing, lock.holds, lock.age_s) == (LockStanding.SHARED, True, 0.5)
+    assert lock.reason == "has 2 publishers on pause (/button, /panel): give each a topic and a key of its own"
+    mux.on_publishers("pause", ["/a", "/b", "/c", "/d"])
+    assert "4 publishers on pause (/a, /b, /c):" in mux.decide(8.5).locks[0].reason
+    mux.on_lock("pause", True, 8.75)
+    assert (mux.decide(8.75).locks[0].standing, mux.decide(8.75).locks[0].reason) == (LockStanding.LOCKED, "holds")
+    mux.on_lock("pause", False, 9.0)
+    mux.on_publishers("pause", ["/panel"])
+    assert mux.decide(9.0).locks[0].holds is False
+
+
+@pytest.mark.parametrize(("nodes", "why"), [([], ""), (["/a"], ""), (["/b", "/a"], "2 publishers on t (/a, /b): give")])
+def test_one_publisher_is_no_crowd_and_two_are(nodes: list[str], why: str) -> None:
+    assert crowd("t", nodes).startswith(why)
+    assert bool(crowd("t", nodes)) is bool(why)
 
 
 def test_locks_are_told_by_falling_priority_and_a_change_of_one_changes_the_essence() -> None:

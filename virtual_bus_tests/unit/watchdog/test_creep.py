@@ -57,6 +57,21 @@ def test_as_soon_as_anything_is_allowed_it_begins_anew(bounds: Bounds) -> None:
     assert look(watch, CREEPS, REST, 11.011 + HOLD_S) != ""
 
 
+# 10 s it creeps ── 10.25 s a moment is allowed ── the whole hold again, from 10.28125 s on
+def test_a_moment_that_is_allowed_gives_the_whole_hold_again() -> None:
+    watch = CreepWatch(replace(config(), order_hold_s=0.375))
+    told = [look(watch, CREEPS, Bounds(0.0, 0.01, 0.0, 0.0) if n == 8 else REST, 10.0 + n / 32) for n in range(22)]
+    assert [n for n, why in enumerate(told) if why] == [21]
+
+
+# 10 s to 10.25 s it creeps ── rests for exactly the hold ── 10.625 s it creeps: the whole hold again
+@pytest.mark.parametrize(("rest", "found_after"), [(12, 12), (11, 4)])
+def test_a_rest_as_long_as_the_hold_ends_it_and_a_shorter_one_does_not(rest: int, found_after: int) -> None:
+    watch = CreepWatch(replace(config(), order_hold_s=0.375))
+    told = [look(watch, CREEPS if n <= 8 or n >= 8 + rest else AT_REST, REST, 10.0 + n / 32) for n in range(40)]
+    assert next(n for n, why in enumerate(told) if why) == 8 + rest + found_after
+
+
 @pytest.mark.parametrize("changes", [{"target_mps": 0.0}, {"state": DriveState.SWITCHED_ON}, {"state": None}])
 def test_a_zero_and_a_drive_without_power_are_no_order(changes: dict[str, object]) -> None:
     watch = CreepWatch(config())

@@ -72,6 +72,32 @@ def test_requests_go_to_guarded_drives_alone_a_guard_time_apart() -> None:
     assert GuardRequests(guarded(), 0.0).tick(0.0) == []
 
 
+# due at 8, 8.125, 8.25 … ── a request that is late by less than a period leaves the next one where it was due
+def test_a_request_that_is_a_little_late_does_not_move_the_next_one() -> None:
+    guard = GuardRequests(every(0.125), 8.0)
+    assert sent(guard, 8.0, 8.1875, 8.25, 8.3125, 8.375) == [8.0, 8.1875, 8.25, 8.375]
+
+
+# due at 8.125 ── sent at 8.25, a whole period late ── the period begins anew there
+def test_after_a_whole_period_without_a_tick_the_period_begins_anew() -> None:
+    guard = GuardRequests(every(0.125), 8.0)
+    assert sent(guard, 8.0, 8.25, 8.3125, 8.375) == [8.0, 8.25, 8.375]
+    late = GuardRequests(every(0.125), 8.0)
+    assert sent(late, 8.0, 8.3125, 8.375, 8.4375) == [8.0, 8.3125, 8.4375]
+
+
+def every(period_s: float) -> WatchdogConfig:
+    """Node 1, guarded with this period."""
+    long = replace(guarded(1), drive_heartbeat_s=5.0 * period_s)
+    assert long.guard_period_s == period_s
+    return long
+
+
+def sent(guard: GuardRequests, *ticks: float) -> list[float]:
+    """At which of these times [s] it sends."""
+    return [at for at in ticks if guard.tick(at)]
+
+
 def test_a_node_with_two_motors_is_requested_once() -> None:
     plain = config((1, 0), (1, 1))
     both = replace(plain, drives=tuple(replace(drive, guarded=True) for drive in plain.drives))

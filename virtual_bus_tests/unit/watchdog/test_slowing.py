@@ -219,3 +219,59 @@ def test_the_numbers_of_the_sample_robot() -> None:
     slope = Slope.of(watchdog_config(robot), 0.0001)
     assert slope == Slope(0.1, 0.25 * robot.limits.deceleration_mps2, 0.005, 0.05)
     assert slope.window_s == slope_window_s(robot) == 0.15
+
+
+# Exactly at its limits. A window of 0.5 s, a lag of 0.125 s, and times that a float holds exactly
+
+EIGHTHS = Slope(lag_s=0.125, least_mps2=0.25, noise_mps=0.03125, floor_mps=0.0)
+
+
+def fails_at(samples: list[tuple[float, float]], since: float = 0.0) -> list[float]:
+    """At which of these times [s], each with a speed, it fails."""
+    watch, found = SlowingWatch(EIGHTHS, since), []
+    for at, mps in samples:
+        watch.on_sample(mps, True, at)
+        if watch.fails:
+            found.append(at)
+    return found
+
+
+def test_a_sample_exactly_a_window_ago_is_compared_with() -> None:
+    """0.125 s is the only one for 0.625, 0.75 and 0.875 s: the third of them shows it."""
+    assert fails_at([(0.125, 0.5), (0.625, 0.5), (0.75, 0.5), (0.875, 0.5)]) == [0.875]
+
+
+def test_two_samples_are_not_enough_however_far_apart_they_are() -> None:
+    assert fails_at([(0.125, 0.5), (0.625, 0.5), (0.8125, 0.5), (0.875, 0.5)]) == [0.875]
+
+
+def test_a_wheel_exactly_as_far_above_the_line_as_noise_is_left_alone() -> None:
+    """It loses 0.1875 m/s²: in a window 0.09375 m/s, where it has to lose 0.125 m/s, less a noise of 0.03125 m/s."""
+    assert fails_at([(0.125 * n, 1.0 - 0.1875 * 0.125 * n) for n in range(1, 40)]) == []
+    assert fails_at([(0.125 * n, 1.0 - 0.1860 * 0.125 * n) for n in range(1, 40)])[0] == 0.875
+
+
+def test_a_sample_exactly_a_window_and_the_time_of_a_threshold_ago_is_compared_with() -> None:
+    """2 m/s at 0.125 s, and 0.5 m/s from then on: no wheel that keeps its speed, until 0.125 s is 0.75 s ago."""
+    steps = [(0.125, 2.0), *((0.125 * n, 0.5) for n in range(2, 12))]
+    assert fails_at(steps)[0] == 0.125 + 0.75 + 3 * 0.125
+
+
+def test_it_fails_when_it_has_lasted_exactly_80_ms() -> None:
+    before = [(-0.875 + 0.125 * n, 1.0 - 0.05 * n) for n in range(3)]
+    assert fails_at([*before, (0.0, 1.0), (0.04, 1.0), (0.08, 1.0)], since=-1.0) == [0.08]
+    assert fails_at([*before, (0.0, 1.0), (0.04, 1.0), (0.0799, 1.0)], since=-1.0) == []
+
+
+# 2 m/s brakes with 1 m/s² for 0.6 s ── keeps 1.4 m/s: compared with what it was up to 0.45 s before, not 1.45 s
+def test_a_wheel_that_stops_braking_on_its_way_is_found_as_soon_as_the_past_is_a_threshold_old() -> None:
+    assert found_s(lambda t: max(1.4, 2.0 - t)) == pytest.approx(0.6 + 0.2 + LASTS_S, abs=HELD_S)
+
+
+def test_no_sample_without_power_fails() -> None:
+    watch = SlowingWatch(EIGHTHS, 0.0)
+    for n in range(1, 20):
+        watch.on_sample(0.5, True, 0.125 * n)
+    assert watch.fails
+    watch.on_sample(0.5, False, 2.5)
+    assert not watch.fails
