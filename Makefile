@@ -232,11 +232,22 @@ $(VENV)/requirements: pyproject.toml Makefile $(VENV)/made
 LOCK := uv pip compile --no-config --quiet --upgrade --universal --python-version 3.10 --generate-hashes --no-annotate \
   --custom-compile-command 'make lock'
 
+# What a user adds to it: a list for each extra, with the versions of the others.
+EXTRAS := cluster evidence explain metrics record web
+define EXTRA
+import sys
+from pip._vendor import tomli
+print(*tomli.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"][sys.argv[1]], sep="\n")
+endef
+export EXTRA
+
 .PHONY: lock
 lock: $(VENV)/requirements ## renews deploy/requirements: what a robot installs, with hashes
 	python -m pip install --quiet 'uv>=0.9'
 	$(LOCK) --extra gpio --no-emit-package numpy pyproject.toml --output-file deploy/requirements/ros_apt.txt
 	$(LOCK) --extra gpio --extra ros pyproject.toml $(VENV)/requirements.txt --output-file deploy/requirements/ros_pypi.txt
+	for extra in $(EXTRAS); do python -c "$$EXTRA" $$extra | $(LOCK) --constraint deploy/requirements/ros_apt.txt \
+	  --constraint deploy/requirements/ros_pypi.txt --output-file deploy/requirements/$$extra.txt - || exit 1; done
 
 $(VENV)/ready: $(VENV)/requirements CMakeLists.txt package.xml $(INTERFACES) $(wildcard deploy/systemd/* deploy/launch/* deploy/bin/*)
 	python -m pip install --quiet --no-deps --no-build-isolation --config-settings build-dir=$(VENV)/build --editable .

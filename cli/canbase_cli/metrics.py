@@ -9,7 +9,7 @@ import typer
 from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments, ros_needed
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
-EXTRA = "pip install 'canbase[metrics]'"
+EXTRA = "pip install 'prometheus-client>=0.22,<1'"
 
 
 def metrics(

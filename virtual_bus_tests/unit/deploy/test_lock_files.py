@@ -28,8 +28,11 @@ ASKED: Final = {
         *EXTRAS["gpio"],
         *EXTRAS["ros"],
     ],
+    **{extra: asked for extra, asked in EXTRAS.items() if extra not in ("gpio", "ros")},
 }
+"""By list: one for each way to have ROS 2, which has `gpio` too, and one for each other extra."""
 FROM_APT: Final = {"ros_apt": {"numpy"}}
+ROS: Final = ("ros_apt", "ros_pypi")
 """ROS 2 from apt is built against the numpy of the distribution."""
 _ENTRY: Final = re.compile(r"(?P<name>[\w.-]+)==(?P<version>[\w.+!-]+)(?: ; (?P<marker>.+))?")
 
@@ -46,7 +49,7 @@ def entries(lock: Path) -> list[tuple[str, str, str, list[str]]]:
     return found
 
 
-def test_there_is_one_for_each_way_to_have_ros() -> None:
+def test_there_is_one_for_each_way_to_have_ros_and_for_each_extra() -> None:
     assert [lock.stem for lock in LOCKS] == sorted(ASKED)
 
 
@@ -75,8 +78,35 @@ def test_it_is_what_pyproject_asks_for(lock: Path) -> None:
             assert all(asked.specifier.contains(version) for version in pinned[name]), name
 
 
-def test_the_installation_asks_for_the_hashes() -> None:
-    text = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+def test_an_extra_changes_nothing_that_is_installed_and_brings_no_numpy() -> None:
+    """The numpy of ROS 2 from apt is that of the distribution."""
+    pins = {lock.stem: {name: (version, hashes) for name, version, _, hashes in entries(lock)} for lock in LOCKS}
+    for extra in set(pins) - set(ROS):
+        assert "numpy" not in pins[extra]
+        for ros in ROS:
+            both = pins[extra].keys() & pins[ros].keys()
+            assert {name: pins[extra][name] for name in both} == {name: pins[ros][name] for name in both}, (extra, ros)
 
-    for lock in LOCKS:
-        assert re.search(rf"pip install --require-hashes -r \S*deploy/requirements/{lock.name}", text)
+
+def pages() -> str:
+    """All that users read, apart from decisions: they are history."""
+    files = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    return "\n".join(file.read_text(encoding="utf-8") for file in files if "decisions" not in file.parts)
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda lock: lock.stem)
+def test_the_installation_asks_for_the_hashes(lock: Path) -> None:
+    assert re.search(rf"pip install --require-hashes -r \S*deploy/requirements/{lock.name}", pages())
+
+
+def test_no_page_has_root_install_what_has_no_hash() -> None:
+    """canbase itself comes from the checkout, and everything else from the lists."""
+    commands = re.findall(r"pip3? install ([^`\n#]*)", pages())
+    assert len(commands) > 10
+    unhashed = [words for words in commands if "--require-hashes" not in words and not is_of_the_checkout(words)]
+    assert unhashed == []
+
+
+def is_of_the_checkout(words: str) -> bool:
+    """A wheel made there, or the checkout itself; with the extra `ros` for a laptop."""
+    return re.search(r"(^|\s)('?\.\[ros\]'?|/opt/canbase/src|dist/\S+\.whl|-e '\.\[ros\]')(\s|$)", words) is not None
