@@ -15,8 +15,13 @@ from typing import Final
 from canbase_deploy.owner import ETC
 
 KEYS: Final = ETC / "keys"
-SERVICES: Final = {"driver": "driver", "velocity": "velocity", "action-server": "action_server"}
-"""Enclaves of deploy/sros2/policy.xml by the parts that have them."""
+SERVICES: Final = {
+    "driver": "driver",
+    "velocity": "velocity",
+    "action-server": "action_server",
+    "metrics": "metrics",
+}
+"""Enclaves of deploy/sros2/policy.xml by the units that have them. Other units see no key (canbase-hardening.conf)."""
 _MADE: Final = "docs/security.md, Keys, makes the part of the keystore that a robot needs"
 
 
@@ -73,9 +78,7 @@ def _of_a_key(file: KeyFile, name: str) -> list[str]:
 
 
 def view(part: str) -> str:
-    """Lines of a unit's [Service] section: of the keystore this part sees its own enclave, the watchdog nothing."""
-    enclave = SERVICES.get(part)
-    if enclave is None:
-        return f"InaccessiblePaths=-{KEYS}\n"
-    shown = [f"{KEYS}/public", f"-{KEYS}/enclaves/governance.p7s", f"{KEYS}/enclaves/canbase/{enclave}"]
-    return f"TemporaryFileSystem={KEYS}:ro\nBindReadOnlyPaths={' '.join(shown)}\n"
+    """Lines of a unit's [Service] section: of the keystore this part sees its own enclave alone. The first takes back
+    what the sandbox of all parts has: no keys."""
+    shown = [f"{KEYS}/public", f"-{KEYS}/enclaves/governance.p7s", f"{KEYS}/enclaves/canbase/{SERVICES[part]}"]
+    return f"InaccessiblePaths=\nTemporaryFileSystem={KEYS}:ro\nBindReadOnlyPaths={' '.join(shown)}\n"

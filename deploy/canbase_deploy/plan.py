@@ -337,8 +337,7 @@ def _tuning(request: Request) -> list[WriteFile]:
         text = f"[Service]\nCPUAffinity={request.cpus}\n"
         files += [_drop_in(part, request.name, "30-cpus", text) for part in PARTS]
     if request.sros2:
-        files += [_drop_in(part, request.name, "50-sros2", _enclave(part)) for part in WITH_ROS]
-        files.append(_drop_in("watchdog", request.name, "50-sros2", f"[Service]\n{view('watchdog')}"))
+        files += [_drop_in(part, request.name, "50-sros2", _enclave(part)) for part in SERVICES]
     relay = request.robot.watchdog.relay
     if relay is not None:
         files.append(_drop_in("watchdog", request.name, "40-relay", drop_in_text(relay.chip)))

@@ -13,6 +13,7 @@ from canbase_fleet.exposition import Exposition
 from canbase_fleet.http_server import Page, PageServer
 from canbase_fleet.robot_topics import POLL_S, RobotTopics, end_signals, utc_now
 from canbase_fleet.vda5050 import line, state
+from canbase_runtime.private_process import guard_keys
 from canbase_runtime.sd_notify import Service
 from canbase_runtime.version import installed_version
 
@@ -26,6 +27,7 @@ def run(robot: Robot, address: tuple[str, int], ros_args: Sequence[str], when_re
 
     Raises OSError where the address cannot be had, before ROS starts. Call from the main thread (signals).
     """
+    guard_keys(os.environ)
     os.nice(NICENESS)
     topics: list[RobotTopics] = []
     server = PageServer(address, _pages(robot, topics))

@@ -11,6 +11,7 @@ from canbase_config.robot import Robot
 from canbase_config.watchdog import RelayLine
 from canbase_deploy.actions import Existing, Link, Remove, Run, WriteFile
 from canbase_deploy.host import manifests
+from canbase_deploy.keystore import SERVICES
 from canbase_deploy.neighbours import Neighbour
 from canbase_deploy.plan import HARDENING, METRICS, PARTS, InstallError, Request, install_plan, left_interfaces
 from support.install_plans import EXAMPLE, TEMPLATES, UNITS, carried_out, changed, on_bus, request, texts
@@ -201,7 +202,7 @@ def test_each_service_has_the_enclave_that_the_policy_gives_it() -> None:
     files = texts(install_plan(request(sros2=True), {}))
     policy = (TEMPLATES.parent / "sros2" / "policy.xml").read_text()
 
-    for part, enclave in {"driver": "driver", "velocity": "velocity", "action-server": "action_server"}.items():
+    for part, enclave in SERVICES.items():
         drop_in = files[f"{UNITS}/canbase-{part}@example.service.d/50-sros2.conf"]
         assert f'Environment="CANBASE_ENCLAVE=--enclave /canbase/{enclave}"' in drop_in
         assert "ROS_SECURITY_STRATEGY=Enforce" in drop_in

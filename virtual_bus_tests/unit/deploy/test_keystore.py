@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import stat
 import subprocess
@@ -12,12 +13,15 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from canbase_deploy import host
+from canbase_deploy.actions import Link
 from canbase_deploy.host import refuse_keystore
 from canbase_deploy.keystore import KEYS, SERVICES, KeyFile, found_in, refusals, view
-from canbase_deploy.plan import InstallError
+from canbase_deploy.plan import HARDENING, InstallError, install_plan
+from support.install_plans import TEMPLATES, UNITS, request, texts
 
-SCRIPT = Path(__file__).parents[3] / "deploy" / "sros2" / "part_of_keystore"
-ENCLAVES = ("driver", "velocity", "action_server", "joystick", "navigation", "sensors", "operator")
+ROOT = Path(__file__).parents[3]
+SCRIPT = ROOT / "deploy" / "sros2" / "part_of_keystore"
+ENCLAVES = (*SERVICES.values(), "joystick", "navigation", "sensors", "operator")
 
 
 @pytest.fixture
@@ -153,7 +157,7 @@ def test_a_missing_enclave_is_refused_before_a_service_does_not_start(robot: Pat
     (wrong,) = refusals(seen(robot))
 
     assert wrong.startswith("/etc/canbase/keys/enclaves/canbase/velocity/key.pem is missing")
-    assert len(refusals([])) == 3
+    assert len(refusals([])) == len(SERVICES)
 
 
 def test_the_installer_refuses_it(keystore: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,9 +167,10 @@ def test_the_installer_refuses_it(keystore: Path, monkeypatch: pytest.MonkeyPatc
         refuse_keystore()
 
 
-def test_a_service_sees_its_own_enclave_alone_and_the_watchdog_none() -> None:
+def test_a_service_sees_its_own_enclave_alone() -> None:
     for part, enclave in SERVICES.items():
-        empty, shown = view(part).splitlines()
+        again, empty, shown = view(part).splitlines()
+        assert again == "InaccessiblePaths="
         assert empty == f"TemporaryFileSystem={KEYS}:ro"
         words = shown.removeprefix("BindReadOnlyPaths=").split()
         assert [word for word in words if "/canbase/keys/enclaves/canbase" in word] == [
@@ -173,7 +178,49 @@ def test_a_service_sees_its_own_enclave_alone_and_the_watchdog_none() -> None:
         ]
         assert f"{KEYS}/public" in words
         assert f"{KEYS}/enclaves" not in words
-    assert view("watchdog") == f"InaccessiblePaths=-{KEYS}\n"
+
+
+UNITS_THERE = sorted(path.name.partition("@")[0] for path in TEMPLATES.glob("canbase-*@.service"))
+
+
+@pytest.mark.parametrize("unit", UNITS_THERE)
+def test_every_unit_has_its_own_enclave_or_sees_no_key(unit: str) -> None:
+    """By the unit files that are there: a new one is neither forgotten nor reads all keys."""
+    files, part = texts(install_plan(request(sros2=True), {})), unit.removeprefix("canbase-")
+    links = [str(action.path) for action in install_plan(request(), {}) if isinstance(action, Link)]
+    template = files[f"{UNITS}/{unit}@.service"]
+    sandbox = files[f"{UNITS}/{HARDENING}"] if f"{UNITS}/{unit}@.service.d/00-hardening.conf" in links else ""
+    own = files.get(f"{UNITS}/{unit}@example.service.d/50-sros2.conf", "")
+    lines = [line for text in (template, sandbox, own) for line in text.splitlines()]
+    hidden = [line.partition("=")[2] for line in lines if line.startswith("InaccessiblePaths=")]
+
+    assert ("--ros-args" in template) is (part in SERVICES)
+    assert hidden[0] == f"-{KEYS}"
+    if part not in SERVICES:
+        assert (hidden[-1], own) == (f"-{KEYS}", "")
+        return
+    assert hidden[-1] == ""
+    assert view(part) in own
+    assert f'Environment="CANBASE_ENCLAVE=--enclave /canbase/{SERVICES[part]}"' in own
+    assert f"ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce ROS_SECURITY_KEYSTORE={KEYS}" in own
+    assert "$CANBASE_ENCLAVE" in template
+    assert f'path="/canbase/{SERVICES[part]}"' in SCRIPT.with_name("policy.xml").read_text()
+
+
+def test_every_process_with_a_key_is_closed_to_others_of_its_user() -> None:
+    mains = {"driver": "driver/canbase_driver/runtime", "velocity": "velocity_mux/canbase_velocity",
+             "action-server": "action_server/canbase_action_server", "metrics": "fleet/canbase_fleet"}  # fmt: skip
+    assert set(mains) == set(SERVICES)
+    for folder in mains.values():
+        assert "    guard_keys(os.environ)\n" in (ROOT / folder / "main.py").read_text()
+
+
+def test_the_documentation_packs_the_keystore_that_is_taken(keystore: Path) -> None:
+    text = (ROOT / "docs" / "security.md").read_text()
+    (words,) = re.findall(r"part_of_keystore keys robot.tar.gz ([\w ]+)", text)
+
+    assert set(words.split()) == set(SERVICES.values())
+    assert [one for one in refusals(seen(unpacked(keystore, *words.split()))) if "is missing" in one] == []
 
 
 def test_a_link_is_never_taken_for_a_key_that_is_in_order(robot: Path) -> None:
