@@ -35,7 +35,7 @@ def robot(mps: float, deceleration_mps2: float, hz: float = 100.0) -> Robot:
         "jerk_mps3": 100.0,
     }
     bench["rates"] |= {"control_hz": hz}
-    bench["timeouts"] |= {"standstill_s": None, "feedback_s": max(0.1, 4.0 / hz)}
+    bench["timeouts"] |= {"standstill_s": None, "feedback_s": max(0.1, 4.0 / hz + 0.01)}
     return Robot.model_validate(bench)
 
 

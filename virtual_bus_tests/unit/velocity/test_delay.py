@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from canbase_config.mux import DEFAULT_SOURCES, MuxSource
 from canbase_runtime.source_standing import SourceStanding
-from canbase_velocity.delay import FUTURE_S, Delay, Sent
+from canbase_velocity.delay import FUTURE_S, SET_BACK_S, Delay, Sent
 from canbase_velocity.mux import LATE_S, MuxDecision
 from canbase_velocity.twist import ZERO, Twist
 from support.mux_world import rested
@@ -276,3 +278,27 @@ def test_each_source_has_a_delay_of_its_own() -> None:
     mux.on_command("joystick", FORWARD, 1.0, sent=Sent(9.0, 0.0, 1.0))
     mux.on_command("navigation", FORWARD, 1.0, sent=Sent(700.0, 0.0, 1.0))
     assert [source.delay_s for source in mux.decide(1.0).sources] == [0.0, 0.0, None]
+
+
+# Exactly at its limits
+
+
+def test_a_delay_as_long_as_the_limit_counts_and_a_longer_one_does_not() -> None:
+    delay = Delay(same_clock=True)
+    assert delay.why_late(0.5, 0.5) == ""
+    assert delay.why_late(math.nextafter(0.5, 1.0), 0.5) == "delayed by 0.50 s (limit 0.50 s, same_clock true)"
+
+
+def test_a_stamp_as_far_in_the_future_as_two_clocks_may_differ_counts() -> None:
+    delay = Delay(same_clock=True)
+    assert delay.why_late(-FUTURE_S, 0.5) == ""
+    assert delay.why_late(-math.nextafter(FUTURE_S, 1.0), 0.5).startswith("stamped in the future by 0.10 s")
+
+
+# stamps of 0.005 s, 0 s ── 0 s, just below 0: no clock was set ── and before the first message none was
+def test_stamps_may_go_back_by_5_ms() -> None:
+    delay = Delay(same_clock=False)
+    assert delay.set_back is False
+    for stamp_s, set_back in ((SET_BACK_S, False), (0.0, False), (math.nextafter(-SET_BACK_S, -1.0), True)):
+        delay.take(Sent(stamp_s, 0.0, 0.0))
+        assert delay.set_back is set_back

@@ -94,3 +94,12 @@ def test_a_reset_ends_the_latch_of_before_the_start() -> None:
     for event in (RESET, SILENCE, RELEASE):
         estop.happens(event)
     assert estop.state is AWAITS_ZERO
+
+
+# the button publishes ── its record is wanted ── it is on disk
+def test_a_record_is_on_disk_once_it_was_written() -> None:
+    estop = Estop(True, Found())
+    estop.happens(RELEASE)
+    assert (estop.record_is_on_disk, bool(estop.unarmed)) == (False, True)
+    estop.on_written(estop.record, "")
+    assert (estop.record_is_on_disk, estop.unarmed) == (True, "")

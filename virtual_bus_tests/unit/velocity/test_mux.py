@@ -211,6 +211,7 @@ def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
 # two nodes publish on one lock: it holds, whatever they say ── one is left, and says that it does not hold
 def test_a_lock_with_two_publishers_holds_and_names_them() -> None:
     mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
+    assert mux.decide(8.0).locks[0].age_s is None
     mux.on_lock("pause", False, 8.0)
     mux.on_publishers("pause", ["/panel"])
     assert [lock.standing for lock in mux.decide(8.0).locks] == [LockStanding.FREE]

@@ -362,3 +362,10 @@ def test_after_a_reset_power_is_ordered_off_before_the_next_one(look: Look) -> N
     off_since = math.inf if look.powered else 10.5
     expected = Climb(Step.HEARTBEAT_WITHHELD, 10.5, 0.5, off_since=off_since)
     assert go(stood, replace(look, seen_at=10.5), 10.5) == expected
+
+
+@pytest.mark.parametrize("step", list(Step))
+def test_the_relay_is_left_for_a_drive_that_keeps_its_power_or_its_speed(step: Step) -> None:
+    climb = Climb(step, since=10.0, begin_mps=0.5)
+    assert climb.defied is (step is Step.RESET_NODE)
+    assert replace(climb, runaway=True).defied is True

@@ -187,3 +187,8 @@ def test_processes_of_another_pid_namespace_cannot_be_told_apart_and_do_not_coun
     assert leases.take(lease(1, 1.1, 0.5), 1000, 1.1, pid=0) is Refusal.SENDER
     assert leases.last is None
     assert leases.take(lease(1, 1.2), 1000, 1.2, pid=1) is None
+
+
+@pytest.mark.parametrize("flags", range(16))
+def test_the_third_flag_alone_orders_to_brake_hard(flags: int) -> None:
+    assert Lease(7, 1_500_000_000, 0.25, -0.5, flags).brakes_hard is (flags in {4, 5, 6, 7, 12, 13, 14, 15})

@@ -245,7 +245,7 @@ def test_two_samples_are_not_enough_however_far_apart_they_are() -> None:
     assert fails_at([(0.125, 0.5), (0.625, 0.5), (0.8125, 0.5), (0.875, 0.5)]) == [0.875]
 
 
-def test_a_wheel_exactly_as_far_above_the_line_as_noise_is_left_alone() -> None:
+def test_a_wheel_exactly_as_far_above_the_line_as_one_bit_is_left_alone() -> None:
     """It loses 0.1875 m/s²: in a window 0.09375 m/s, where it has to lose 0.125 m/s, less a noise of 0.03125 m/s."""
     assert fails_at([(0.125 * n, 1.0 - 0.1875 * 0.125 * n) for n in range(1, 40)]) == []
     assert fails_at([(0.125 * n, 1.0 - 0.1860 * 0.125 * n) for n in range(1, 40)])[0] == 0.875
