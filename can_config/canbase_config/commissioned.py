@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 Step = Literal["directions", "scale", "proof", "floor"]
 STEPS: Final[tuple[Step, ...]] = ("directions", "scale", "proof", "floor")
 DIGITS: Final = 12
+UNIT_ERROR: Final = 10.0
+"""A velocity unit that is wrong is so by 10 or more (rpm, 0.1 rpm)."""
+SLOWEST_MPS: Final = 0.02
+"""Slower than that many drives cannot turn a wheel."""
 Mark = Annotated[str, Field(pattern=rf"^[dspfi][0-9a-f]{{{DIGITS}}}$", max_length=1 + DIGITS)]
 
 
@@ -113,6 +117,18 @@ def uncommissioned(robot: Robot) -> str:
     defects = [f"not done: {', '.join(missing)}"] if missing else []
     defects += [f"robot.yaml has changed since: {', '.join(changed)}"] if changed else []
     return f"this robot is not commissioned ({'; '.join(defects)})" if defects else ""
+
+
+def uncommissioned_mps(robot: Robot) -> float:
+    """The speed limit of a robot that is not commissioned [m/s].
+
+    Until `scale` has shown how far each wheel turns, a tenth of `limits.linear_mps` at most: a wheel whose drive counts
+    in a unit that is wrong by 10 stays within the robot's own limit until the watchdog trips.
+    """
+    limit_mps = robot.safety.uncommissioned_mps
+    if robot.commissioned.scale == mark(robot, "scale"):
+        return limit_mps
+    return min(limit_mps, max(robot.limits.linear_mps / UNIT_ERROR, SLOWEST_MPS))
 
 
 def _shown(robot: Robot, step: Step) -> list[Any]:

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from canbase_config import bus_load
-from canbase_config.commissioned import kind_alone, uncommissioned, without_proof
+from canbase_config.commissioned import kind_alone, uncommissioned, uncommissioned_mps, without_proof
 from canbase_config.errors import ConfigError, Loc, Problem
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
@@ -74,7 +74,8 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
         yield Problem(place.file, place.line, place.key, busy)
     if why := uncommissioned(robot):
         place = file.place(("commissioned",) if ("commissioned",) in file.lines else ("drives",))
-        slow = f"until canbase commission it goes {robot.safety.uncommissioned_mps:g} m/s (safety.uncommissioned_mps)"
+        limit = f"{uncommissioned_mps(robot):g} m/s (safety.uncommissioned_mps{_tenth(robot)})"
+        slow = f"until canbase commission it goes {limit}"
         yield Problem(place.file, place.line, place.key, f"{why}: {slow}")
     if robot.safety.require_self_stop and (why := without_proof(robot)):
         place = file.place(("safety", "require_self_stop"))
@@ -85,6 +86,12 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
     for loc, sentence in uncertain_stops(robot):
         place = file.place(loc if loc in file.lines else loc[:-1])
         yield Problem(place.file, place.line, place.key, sentence)
+
+
+def _tenth(robot: Robot) -> str:
+    if uncommissioned_mps(robot) == robot.safety.uncommissioned_mps:
+        return ""
+    return "; a tenth of limits.linear_mps until `scale` has proven the units of the drives"
 
 
 def samples() -> list[str]:

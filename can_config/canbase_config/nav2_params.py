@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from canbase_config.action import BEHAVIORS
-from canbase_config.commissioned import uncommissioned
+from canbase_config.commissioned import uncommissioned, uncommissioned_mps
 from canbase_config.nav2_chain import NODES, SMOOTHED, Chain, chain, full_name
 from canbase_config.robot import Robot
 from canbase_config.safety import Footprint, Scan
@@ -70,7 +70,7 @@ def speeds(robot: Robot) -> Speeds:
     linear_mps = min(limits.linear_mps, ceiling.linear_mps if ceiling else math.inf)
     angular_radps = min(limits.angular_radps, ceiling.angular_radps if ceiling else math.inf)
     if uncommissioned(robot):
-        linear_mps = min(linear_mps, robot.safety.uncommissioned_mps)
+        linear_mps = min(linear_mps, uncommissioned_mps(robot))
     return Speeds(linear_mps, angular_radps)
 
 

@@ -117,7 +117,13 @@ class Safety(Section):
         ),
     ] = 0.15
     uncommissioned_mps: Annotated[
-        float, Field(ge=0.02, le=5.0, description="speed limit until canbase commission has finished all steps [m/s]")
+        float,
+        Field(
+            ge=0.02,
+            le=5.0,
+            description="speed limit until canbase commission has finished all steps, and at most a tenth of "
+            "limits.linear_mps until its step scale has proven the units of the drives [m/s]",
+        ),
     ] = 0.3
     require_self_stop: Annotated[
         bool,

@@ -78,14 +78,14 @@ def good_file(loaded: Loaded) -> Check:
 
 def commissioning(loaded: Loaded) -> list[Check]:
     """Whether a person has looked at the wheels and measured the floor; nothing where the bus has no wire."""
-    from canbase_config.commissioned import uncommissioned
+    from canbase_config.commissioned import uncommissioned, uncommissioned_mps
 
     if loaded.robot.bus.is_virtual:
         return []
     why = uncommissioned(loaded.robot)
     if not why:
         return [ok("commissioning", "done, and robot.yaml has not changed since"), *_self_stop_proof(loaded)]
-    slow = f"no faster than safety.uncommissioned_mps, {loaded.robot.safety.uncommissioned_mps:g} m/s"
+    slow = f"no faster than safety.uncommissioned_mps, {uncommissioned_mps(loaded.robot):g} m/s"
     cure = "canbase commission: wrong signs and scales show on the floor alone"
     return [warn("commissioning", f"{why}; {slow}", cure), *_self_stop_proof(loaded)]
 

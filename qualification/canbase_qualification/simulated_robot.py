@@ -16,7 +16,7 @@ from canbase_campaign.robots import commissioned
 from canbase_campaign.scanner import LIES
 from canbase_campaign.twins import SERVER
 from canbase_config import bus_load
-from canbase_config.commissioned import uncommissioned, without_proof
+from canbase_config.commissioned import uncommissioned, uncommissioned_mps, without_proof
 from canbase_config.mux import JOINTS, MuxSource
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan
@@ -152,7 +152,7 @@ def _slowest_scan(robot: Robot) -> Scan:
 
 def _assumed(robot: Robot, changed: Robot, hands: tuple[str, ...], has_scanner: bool) -> Iterator[str]:
     if uncommissioned(robot):
-        slow = robot.safety.uncommissioned_mps
+        slow = uncommissioned_mps(robot)
         yield f"The robot is commissioned: the speeds of `limits` count, not safety.uncommissioned_mps ({slow:g} m/s)."
     if robot.safety.require_self_stop and without_proof(robot):
         yield "Drives get power without the proof that safety.require_self_stop demands."

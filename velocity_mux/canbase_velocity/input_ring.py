@@ -148,7 +148,10 @@ def head(robot: Robot, config: FilterConfig, stop: Stop, wall_offset_s: float) -
         "stop": asdict(stop),
         "wall_offset_s": wall_offset_s,
         "uncommissioned": config.uncommissioned,
-        "robot_yaml": {name: getattr(robot, name).model_dump(mode="json") for name in SECTIONS},
+        "robot_yaml": {
+            name: (config.safety if name == "safety" else getattr(robot, name)).model_dump(mode="json")
+            for name in SECTIONS
+        },
     }
 
 

@@ -23,7 +23,7 @@ import sys
 from dataclasses import dataclass, replace
 from typing import Final
 
-from canbase_config.commissioned import uncommissioned
+from canbase_config.commissioned import uncommissioned, uncommissioned_mps
 from canbase_config.robot import Limits, Robot
 from canbase_config.safety import Ceiling, Safety
 from canbase_runtime.stop_cause import StopCause
@@ -64,7 +64,8 @@ class FilterConfig:
         """The filter's part of `robot`."""
         geometry = Geometry.of(robot.limits, robot.safety, robot.rates.command_hz)
         standstill_mps, why = robot.base.standstill_mps, uncommissioned(robot)
-        return FilterConfig(robot.limits, robot.safety, standstill_mps, geometry, why)
+        safety = robot.safety.model_copy(update={"uncommissioned_mps": uncommissioned_mps(robot)})
+        return FilterConfig(robot.limits, safety, standstill_mps, geometry, why)
 
 
 @dataclass(frozen=True, slots=True)

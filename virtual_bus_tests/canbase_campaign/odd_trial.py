@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from canbase_campaign.advice import Advice, has_key, read_advice
+from canbase_campaign.advice import OF_A_DRIVE, Advice, has_key, read_advice
 from canbase_campaign.judge import Judge
 from canbase_campaign.outside import Outside, Surroundings
 from canbase_campaign.plan import Plan
@@ -74,8 +74,8 @@ class Setup:
         """A key of the profile of this node's drive, or of robot.yaml."""
         if has_key(Profile, key):
             _put(self._profiles.setdefault(node_id, {"title": "odd drive"}), key, value)
-        elif key == "mode":
-            self._drive(node_id)["mode"] = value
+        elif key in OF_A_DRIVE:
+            self._drive(node_id)[key] = value
         else:  # of the whole robot: what suits all of its drives
             suits = min if key.startswith("limits.") else max
             self._common[key] = suits(self._common.get(key, value), value)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Literal
 
 from canbase_campaign.disk import StopDisk, WatchdogDisk
@@ -21,6 +22,7 @@ from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_sim.frame import Frame as BenchFrame
 from canbase_sim.node import SimulatedNode
+from canbase_sim.odd.draw import OddDrive
 from canbase_sim.personality import PERSONALITIES
 from canbase_sim.world.bench import Bench, BenchParameters, Truth
 from canbase_velocity.lease import lease_datagram
@@ -71,11 +73,12 @@ class World:
         parameters: BenchParameters | None = None,
         aim: Aim = Aim.ACTIVE,
         keeps: bool = False,
+        odd: Mapping[int, OddDrive] = MappingProxyType({}),
     ) -> None:
-        """`keeps`: driver and watchdog keep records of their stops, on `disk` and `watchdog_disk`."""
+        """`keeps`: driver and watchdog keep records of their stops, on `disk` and `watchdog_disk`. `odd`: by node."""
         self.robot = robot or bench_robot()
         self._start, self._steps = 100.0, 0
-        self.bench = Bench(self.robot, self.now_s, parameters=parameters)
+        self.bench = Bench(self.robot, self.now_s, parameters=parameters, odd=odd)
         self._keeps = keeps
         self.disk, self.watchdog_disk = StopDisk("driver"), WatchdogDisk()
         self.driver: DriverCore | None = DriverCore(self.robot, aim, self.disk.found() if keeps else None)

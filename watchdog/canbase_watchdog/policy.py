@@ -402,7 +402,7 @@ CHECKS = (
         TripCause.FEEDBACK_IMPLAUSIBLE,
         _feedback_implausible,
         _over,
-        "nothing else; look at the encoder first",
+        "nothing else; check the encoder, and whether velocity_unit and counts_per_motor_rev are those of the drive",
         by_bus=True,
     ),
     Check(

@@ -8,7 +8,7 @@ from dataclasses import replace
 from canbase_config.drive import Drive
 from canbase_config.profile import Sdo
 from canbase_config.robot import Robot
-from canbase_driver.boot.sequence import DEVICE_TYPE, BootReport, boot
+from canbase_driver.boot.sequence import BootReport, boot
 from canbase_driver.boot.steps import (
     NO_PATIENCE,
     BootError,
@@ -17,19 +17,15 @@ from canbase_driver.boot.steps import (
     Quiet,
     SendNmt,
     Step,
-    Steps,
     WaitBootUp,
-    boot_error,
 )
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtCommand, NmtState, nmt, parse_heartbeat
 from canbase_driver.cia301.sdo_client import (
     LONGEST_TIMEOUT_S,
     Read,
-    SdoAborted,
     SdoClient,
     SdoError,
-    SdoTimeout,
     Write,
 )
 
@@ -44,7 +40,7 @@ class NodeBoot:
     """One boot of one node; for another try make a new one. `drives` are the axes of the node, one or two.
 
     Give it every frame by `on_frame`, then, and at least every 10 ms, call `tick` and send what it returns. It has
-    ended when `report` or `error` is set. One boot takes 45 to 110 SDO transfers an axis: calling `tick` right after
+    ended when `report` or `error` is set. One boot takes 45 to 115 SDO transfers an axis: calling `tick` right after
     `on_frame` makes them follow each other without waiting.
     """
 
@@ -173,19 +169,11 @@ class NodeBoot:
         try:
             step = self._sequence.throw(answer) if isinstance(answer, SdoError) else self._sequence.send(answer)
         except StopIteration as end:
-            self._finish(end.value, now_s)
+            self._end(report=end.value)
         except BootError as error:
             self._end(error=error)
         else:
             self._begin(step, now_s)
-
-    def _finish(self, report: BootReport, now_s: float) -> None:
-        """After a last write that was requested twice, one more object is read: its answer comes behind all others."""
-        if self._client.owes_confirmation:
-            self._sequence = _one_more(report)
-            self._begin(next(self._sequence), now_s)
-        else:
-            self._end(report=report)
 
     def _begin(self, step: Step, now_s: float) -> None:
         self._step = step
@@ -233,16 +221,6 @@ class NodeBoot:
 def sdo_client(node_id: int, sdo: Sdo, timeout_s: float) -> SdoClient:
     """A client with the settings of the profile; `timeout_s` [s] where the profile has none."""
     return SdoClient(node_id, sdo.timeout_s or timeout_s, sdo.attempts)
-
-
-def _one_more(report: BootReport) -> Steps[BootReport]:
-    try:
-        yield Read(DEVICE_TYPE)
-    except SdoTimeout as silent:
-        raise boot_error(silent) from silent
-    except SdoAborted:
-        pass  # an answer as well
-    return report
 
 
 def _awaited(step: Step | None) -> str:

@@ -1,12 +1,38 @@
-"""Whether a drive still means by its numbers what it meant when `canbase commission` turned its wheel. CiA 402-2."""
+"""Whether a drive counts as robot.yaml says, and as it did when its wheel was measured. CiA 402-2."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from canbase_config.drive import Drive
 from canbase_config.object_map import AXIS_OFFSET
+from canbase_config.reported_units import REPORTED, Misfit, misfits, undecided
 from canbase_config.scale_objects import RATIOS, SCALE_OBJECTS, Expected
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
+
+
+def check_scale(node: NodeAccess, drive: Drive, *, identify: bool) -> Steps[tuple[Expected, ...]]:
+    """The units that the drive reports. Raises BootError for one that contradicts `expects`, or else robot.yaml.
+
+    `identify`: read all of SCALE_OBJECTS, not just those that can contradict robot.yaml.
+    """
+    scale = yield from read_scale(drive, SCALE_OBJECTS if identify else REPORTED)
+    yield from check_expected(node, drive)
+    offset = _offset(drive)
+    objects = {(each.index - offset, each.sub): each.value for each in scale}
+    measured = {each.index - offset for each in drive.expects}
+    for misfit in misfits(drive, objects, measured):
+        problem = (
+            f"{_at(drive, misfit)}: {misfit.meaning}, and robot.yaml has {misfit.key}: {misfit.has}, so {misfit.effect}"
+        )
+        raise BootError(node.node_id, problem, _unit_cure(drive, misfit, offset))
+    if unclear := undecided(objects, measured):
+        node.notes.append(
+            f"{', '.join(unclear)} of {drive.joint}: it cannot be decided whether velocity_unit and "
+            "counts_per_motor_rev fit; canbase commission --steps directions,scale shows it"
+        )
+    return scale
 
 
 def check_expected(node: NodeAccess, drive: Drive) -> Steps[None]:
@@ -23,11 +49,10 @@ def check_expected(node: NodeAccess, drive: Drive) -> Steps[None]:
             raise BootError(node.node_id, problem, _cure(drive, expected))
 
 
-def read_scale(drive: Drive) -> Steps[tuple[Expected, ...]]:
+def read_scale(drive: Drive, indexes: Iterable[int]) -> Steps[tuple[Expected, ...]]:
     """Those of SCALE_OBJECTS that the drive has, with their values. It is no defect to have none."""
-    offset = AXIS_OFFSET * drive.axis if drive.kind.layout.second_axis == "offset" else 0
-    found = []
-    for index in SCALE_OBJECTS:
+    offset, found = _offset(drive), []
+    for index in indexes:
         for sub in (1, 2) if index in RATIOS else (0,):
             try:
                 data: bytes = yield Read(index + offset, sub)
@@ -35,6 +60,23 @@ def read_scale(drive: Drive) -> Steps[tuple[Expected, ...]]:
                 break
             found.append(Expected(index=index + offset, sub=sub, value=unsigned(data[:4])))
     return tuple(found)
+
+
+def _offset(drive: Drive) -> int:
+    return AXIS_OFFSET * drive.axis if drive.kind.layout.second_axis == "offset" else 0
+
+
+def _at(drive: Drive, misfit: Misfit) -> str:
+    return f"{misfit.at}{_name(misfit.index)} of {drive.joint}"
+
+
+def _unit_cure(drive: Drive, misfit: Misfit, offset: int) -> str:
+    entry = f"{{index: 0x{misfit.index + offset:04X}, sub: {misfit.sub}, value: {misfit.value}}}"
+    fits = f"set `{misfit.key}: {misfit.fits}`" if misfit.fits else f"no {misfit.key} means this"
+    return (
+        f"In robot.yaml, {fits} for {drive.joint}, or set {misfit.index + offset:04X}h with the maker's tool to what "
+        f"robot.yaml has. Where its wheel was measured and robot.yaml is right, add {entry} to its `expects`"
+    )
 
 
 def _name(index: int) -> str:

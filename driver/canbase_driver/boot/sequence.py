@@ -16,7 +16,7 @@ from canbase_config.robot import Robot
 from canbase_config.scale_objects import Expected
 from canbase_config.stopping import standstill_s
 from canbase_driver.boot.pdo_mapping import configure_pdos
-from canbase_driver.boot.scale_check import check_expected, read_scale
+from canbase_driver.boot.scale_check import check_scale
 from canbase_driver.boot.sdo_channels import close_sdo_channels
 from canbase_driver.boot.settings import (
     SelfStopSet,
@@ -73,7 +73,7 @@ class BootReport:
     changes: tuple[str, ...] = ()
     """Every object that had another value than wanted: the old one and the new one."""
     scale: Mapping[str, tuple[Expected, ...]] = field(default_factory=dict)
-    """By joint, where it was asked for: what its numbers mean."""
+    """By joint: what its numbers mean, as far as the drive reports it."""
 
     @property
     def stops_by_itself(self) -> bool:
@@ -86,9 +86,10 @@ def boot(
 ) -> Steps[BootReport]:
     """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
 
-    `identify`: read all of 1018h, not just what `identity` in robot.yaml expects, and all units, not just `expects`.
+    `identify`: read all of 1018h, not just what `identity` in robot.yaml expects, and all units.
 
-    The steps end with the report, or raise BootError when the node cannot be made ready.
+    The last steps read the units: an answer to a write that was requested twice comes before theirs. The steps end with
+    the report, or raise BootError when the node cannot be made ready.
     """
     return _explained(_Boot(node_id, drives, robot, patience, identify).run())
 
@@ -126,9 +127,7 @@ class _Boot:
         yield from write_all(self._node, self._kind.writes.after_mapping)
         scale = {}
         for drive in self._drives:
-            yield from check_expected(self._node, drive)
-            if self._identify:
-                scale[drive.joint] = yield from read_scale(drive)
+            scale[drive.joint] = yield from check_scale(self._node, drive, identify=self._identify)
         notes = tuple(dict.fromkeys(self._node.notes))
         return BootReport(self._node.node_id, identity, self_stop, notes, tuple(self._node.changes), scale)
 

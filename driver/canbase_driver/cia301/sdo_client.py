@@ -190,8 +190,6 @@ class SdoClient:
         """Of all requests; `_requests` leaves out those that the watchdog makes too."""
         self._unconfirmed: set[bytes] = set()
         """Addresses that were written, and whose last confirmation may not have come yet."""
-        self._repeated = False
-        """The last transfer took more than one request."""
         self._timeout_s = timeout_s
         self._attempts = attempts
         self._transfer: Transfer | None = None
@@ -216,18 +214,12 @@ class SdoClient:
         """
         return at in self._unconfirmed
 
-    @property
-    def owes_confirmation(self) -> bool:
-        """Whether the transfer that ended last was a write with more than one request: another answer may come."""
-        return self._repeated and bool(self._unconfirmed)
-
     def start(self, step: Read | Write, now_s: float) -> Frame:
         """Begin a transfer. Raises RuntimeError while another is under way."""
         if self._transfer is not None:
             raise RuntimeError(f"node {self.node_id}: {self._transfer.step} is under way; wait for its answer")
         self._answer = None
         self._ends_s = self._end_s(now_s)
-        self._repeated = False
         self._addresses.add(address(step))
         if isinstance(step, Write):
             self._unconfirmed.add(address(step))
@@ -237,7 +229,6 @@ class SdoClient:
         """Restart the transfer under way: the drive has just started. Raises RuntimeError when there is none."""
         if self._transfer is None:
             raise RuntimeError(f"node {self.node_id}: no transfer is under way")
-        self._repeated = True
         self._ends_s = self._end_s(now_s)
         return self._begin(self._transfer.step, self._attempts, now_s)
 
@@ -360,7 +351,6 @@ class SdoClient:
         step = transfer.step
         abort = self._abort_frame(step, code)
         if transfer.attempts_left:
-            self._repeated = True
             return [abort, self._begin(step, transfer.attempts_left, now_s)]
         self._finish(self._timeout(step) if code == TIMED_OUT else SdoAborted(self.node_id, step, code))
         return [abort]

@@ -30,6 +30,14 @@ STEEP = {key(index): 100_000 for index in (0x6083, 0x6084)}
 GENERAL_ERROR = 0x0800_0000
 TYPES = tuple(key(base + n, 2) for base in (0x1400, 0x1800) for n in range(4))
 EVENT_TYPES = (254, 255)
+VELOCITY_UNITS = {
+    "rpm": {key(0x60A9): Extra("I", 0x00B4_4700)},
+    "0.001rpm": {key(0x60A9): Extra("I", 0xFDB4_4700)},
+    "rev/s": {key(0x608C): Extra("B", 0xA3), key(0x608B): Extra("b", 0)},
+    "0.001rev/s": {key(0x60A9): Extra("I", 0xFDB4_0300)},
+    "counts/s": {key(0x60A9): Extra("I", 0x00B5_0300)},
+}
+"""Units of 60FFh that are not those of the sample robot's file, and the objects by which a drive reports them."""
 RAMP_BITS_PER_MPS2 = 19098.6
 """6085h of the sample robot, whose velocity unit is 0.1 rpm: gear 20, wheel radius 0.1 m."""
 
@@ -185,6 +193,14 @@ def _keeps_no_rtr(_random: Random) -> Drawn:
     return Drawn("COB-IDs of PDOs must keep bit 30", with_personality(sets_no_rtr=True, needs_no_rtr=True))
 
 
+def _other_unit(random: Random) -> Drawn:
+    """As seen: 60A9h = rpm was readable, robot.yaml had 0.1rpm, and the base drove 10 times as fast as commanded."""
+    unit = random.choice(sorted(VELOCITY_UNITS))
+    change = with_personality(extras=VELOCITY_UNITS[unit], target_unit=unit, actual_unit=unit)
+    index = 0x608C if unit == "rev/s" else 0x60A9
+    return Drawn(f"one bit of its velocities is 1 {unit}, by {index:04X}h", change, {"velocity_unit": unit})
+
+
 def _few_pdos(random: Random) -> Drawn:
     number = random.choice((2, 3))
     gone = [base + n for base in (0x1400, 0x1600, 0x1800, 0x1A00) for n in range(number, 4)]
@@ -316,6 +332,8 @@ ALIKE = (
     frozenset(("guarding_alone", "missing", "watches")),
     frozenset(("coasts", "stays_in_quick_stop")),
     frozenset(("soft_stop", "rounded_ramps")),
+    frozenset(("other_unit", "soft_stop", "rounded_ramps", "refused", "missing")),  # ramps in the unit of 60FFh
+    frozenset(("other_unit", "noisy_velocity", "narrow_target", "narrow_velocity", "one_tpdo", "stored_values")),
 )
 """A drive has one of each of these sets at most."""
 ODDITIES: Mapping[str, Oddity] = {
@@ -362,6 +380,7 @@ ODDITIES: Mapping[str, Oddity] = {
     "status_bits": Oddity("CiA 402-2, 6041h bits 7, 8, 11, 14, 15", "maker's bits come and go", _status_bits),
     "noisy_velocity": Oddity("CiA 402-2, 606Ch: no accuracy", "the measured speed has noise", _noisy_velocity),
     "emergencies": Oddity("CiA 301, EMCY: FFxxh", "the maker's emergency messages", _emergencies),
+    "other_unit": Oddity("CiA 402-2, 60A9h; 608Bh, 608Ch of 2.0", "its velocities have another unit", _other_unit),
     "count_wraps": Oddity("CiA 402-2, 6064h: INTEGER32", "the counter of the encoder wraps", _count_wraps),
 }
 """By name."""

@@ -202,7 +202,8 @@ class Bench:
             idle = DEFAULT_BODY.motor(1)
             return AxisParts(idle, _scale_of(self._robot, self._robot.drives[0]), _nowhere, 0)
         drive = self._robot.drives[i]
-        scale = _scale_of(self._robot, drive)
+        odd = self._odd.get(drive.node_id)
+        scale = _scale_of(self._robot, drive, odd.manner.personality if odd else None)
         offset = self._parameters.encoder_offset * (i + 1)
         return AxisParts(self._motors[i], scale, self._travel(drive), offset, partial(self.base.hold, drive.side))
 
@@ -218,8 +219,8 @@ def _personality(drive: Drive) -> Personality:
     return PERSONALITIES.get(drive.profile, GENERIC)
 
 
-def _scale_of(robot: Robot, drive: Drive) -> Scale:
-    return Scale.of(drive, robot.base.radius_m(drive.side), _personality(drive))
+def _scale_of(robot: Robot, drive: Drive, personality: Personality | None = None) -> Scale:
+    return Scale.of(drive, robot.base.radius_m(drive.side), personality or _personality(drive))
 
 
 def _identity(drive: Drive) -> dict[int, int]:

@@ -35,7 +35,7 @@ def test_two_drives_are_enabled_within_a_second_and_eight_within_one_and_a_half_
         (bench_robot(), 500_000, 0.5),
         (bench_robot(), 125_000, 0.7),
         (robot_of(*EIGHT), 1_000_000, 0.5),  # type: ignore[arg-type]
-        (robot_of(*EIGHT), 500_000, 0.62),  # type: ignore[arg-type]
+        (robot_of(*EIGHT), 500_000, 0.66),  # type: ignore[arg-type]
     ],
     ids=["two, 500 kbit/s", "two, 125 kbit/s", "eight, 1 Mbit/s", "eight, 500 kbit/s"],
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from canbase_commissioning.edits import edited, expects_edits, with_edits
-from canbase_config.commissioned import mark
+from canbase_config.commissioned import mark, uncommissioned_mps
 from canbase_config.drive import Identity
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -18,8 +18,11 @@ from canbase_driver.boot.sequence import BootReport
 from canbase_driver.boot.settings import STOPS_BY_NOTHING
 from canbase_driver.drives import drive_group
 from canbase_driver.drives.canopen_node import CanopenNode
+from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia301.dictionary import key
+from canbase_sim.odd.draw import OddDrive
+from canbase_sim.odd.oddity import Drawn, with_manner
 from canbase_sim.personality import PERSONALITIES, Extra, Personality
 from canbase_watchdog.trip_cause import TripCause
 from support.chain_world import FORWARD, World, bench_robot
@@ -139,3 +142,72 @@ def test_the_boot_of_commissioning_reads_all_that_the_drive_has(monkeypatch: pyt
         Expected(index=0x608F, sub=1, value=counts),
         Expected(index=0x608F, sub=2, value=1),
     )
+
+
+def in_rpm(monkeypatch: pytest.MonkeyPatch, objects: dict[int, Extra]) -> None:
+    """All drives count in rpm; robot.yaml has 0.1rpm."""
+    found = PERSONALITIES.get("generic", Personality())
+    set_personality(monkeypatch, "generic", replace(found, extras=objects, target_unit="rpm", actual_unit="rpm"))
+
+
+def with_unit(unit: str, *expected: Expected) -> Robot:
+    base = robot(*expected)
+    drives = [drive.model_dump() | {"velocity_unit": unit} for drive in base.drives]
+    return Robot.model_validate(base.model_dump() | {"drives": drives})
+
+
+# 60A9h = rpm, velocity_unit: 0.1rpm: 0.2 m/s commanded, 1.24 m driven
+def test_a_unit_that_the_drive_reports_and_robot_yaml_contradicts_gets_no_power(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    in_rpm(monkeypatch, {key(0x60A9): Extra("I", 0x00B4_4700)})
+    world = World()
+    world.command = FORWARD
+    assert not world.run(3.0, lambda: any(world.powered))
+    problem = world.snapshot.drives[0].boot_problem
+    assert "60A9h:0 = 00B44700h (SI unit velocity) of left_wheel: one bit of 60FFh and 606Ch is 1 rev/min" in problem
+    assert "robot.yaml has velocity_unit: 0.1rpm, so its wheel would turn 10 times as fast as commanded" in problem
+    assert "In robot.yaml, set `velocity_unit: rpm` for left_wheel" in problem
+    assert "add {index: 0x60A9, sub: 0, value: 11814656} to its `expects`" in problem
+
+
+def test_the_value_of_the_message_cures_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    in_rpm(monkeypatch, {key(0x60A9): Extra("I", 0x00B4_4700)})
+    world = World(with_unit("rpm"))
+    world.drive(seconds=1.0)
+    assert world.truth.linear_mps == pytest.approx(FORWARD.linear_mps, rel=0.02)
+
+
+def test_a_drive_that_reports_a_unit_it_does_not_use_drives_once_the_wheel_was_measured(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = PERSONALITIES.get("generic", Personality())
+    set_personality(monkeypatch, "generic", replace(found, extras={key(0x60A9): Extra("I", 0x00B4_4700)}))
+    World(with_unit("0.1rpm", Expected(index=0x60A9, value=0x00B4_4700))).enable()
+
+
+@pytest.mark.parametrize("code", [0x0602_0000, 0x0601_0001, 0x0800_0000])
+def test_a_drive_that_does_not_report_its_unit_gets_power(monkeypatch: pytest.MonkeyPatch, code: int) -> None:
+    """Whatever it aborts with; how fast it may go then is the filter's: `uncommissioned_mps`."""
+    odd = {n: OddDrive(0, (Drawn("", with_manner(refused_reads={key(0x60A9): code})),)) for n in (1, 2)}
+    world = World(odd=odd)
+    world.enable()
+
+
+# no proof: 0.08 m/s, a tenth of the limit; the drives count 10 times as much
+def test_without_a_proof_a_unit_that_is_wrong_by_10_stays_within_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    in_rpm(monkeypatch, {})
+    wired = bench_robot().model_copy(update={"bus": load_robot(sample("example_can0")).robot.bus})
+    world = World()
+    world.enable()
+    world.command = Twist2D(uncommissioned_mps(wired), 0.0)
+    assert world.command.linear_mps == pytest.approx(wired.limits.linear_mps / 10.0)
+    fastest = 0.0
+    begin_m = world.truth.travel_m
+    for _ in range(1500):
+        world.run(0.002)
+        fastest = max(fastest, abs(world.truth.linear_mps))
+    assert watchdog_cause(world) is TripCause.FEEDBACK_IMPLAUSIBLE
+    assert fastest <= 1.05 * wired.limits.linear_mps, "its velocity loop swings over"
+    assert world.truth.travel_m - begin_m < 0.7
+    assert not any(world.powered)

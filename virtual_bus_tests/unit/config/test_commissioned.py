@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from canbase_commissioning.edits import Edit, commissioned_edits, edited, with_edits
-from canbase_config.commissioned import STEPS, Step, _shown, mark, uncommissioned
+from canbase_config.commissioned import STEPS, Commissioned, Step, _shown, mark, uncommissioned
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_doctor.check import Verdict, commissioning
@@ -143,12 +143,15 @@ def test_until_then_no_corner_of_the_base_is_faster_than_safety_uncommissioned_m
     unknown = FilterConfig.of(robot.model_copy(update={"commissioned": bench_robot().commissioned}))
     ahead, turning = Twist(0.8, 0.0), Twist(0.0, 2.0)
     assert decide(replace(GOOD, command=ahead), known).twist == ahead
+    proven = Commissioned(scale=mark(robot, "scale"))
+    measured = FilterConfig.of(robot.model_copy(update={"commissioned": proven}))
+    assert decide(replace(GOOD, command=ahead), measured).twist.linear_mps == pytest.approx(0.3)
     slower = decide(replace(GOOD, command=ahead), unknown)
-    assert slower.twist.linear_mps == pytest.approx(0.3)
+    assert slower.twist.linear_mps == pytest.approx(robot.limits.linear_mps / 10.0)
     assert slower.cause is StopCause.SPEED
     assert "this robot is not commissioned (not done: directions, scale, proof, floor)" in slower.detail
     assert slower.clears_on == "canbase commission"
-    assert decide(replace(GOOD, command=turning), unknown).twist.angular_radps == pytest.approx(0.3 / (0.31 * 2**0.5))
+    assert decide(replace(GOOD, command=turning), unknown).twist.angular_radps == pytest.approx(0.08 / (0.31 * 2**0.5))
 
 
 def test_a_bus_without_a_wire_needs_none() -> None:

@@ -13,6 +13,7 @@ import yaml
 from typer.testing import CliRunner, Result
 
 from canbase_cli.main import app
+from canbase_config.commissioned import uncommissioned_mps
 from canbase_config.load import load_robot, sample
 from canbase_config.nav2_chain import chain
 from canbase_config.nav2_params import ROS, Bounded, parameters, speeds
@@ -136,7 +137,7 @@ def test_speeds_are_those_that_the_filter_lets_through() -> None:
     slow = speeds(robot(safety__ceiling=ceiling))
     assert (slow.linear_mps, slow.angular_radps) == (0.6, 2.0)
     fresh = robot("example_can0")
-    assert speeds(fresh).linear_mps == min(fresh.limits.linear_mps, fresh.safety.uncommissioned_mps)
+    assert speeds(fresh).linear_mps == uncommissioned_mps(fresh) < fresh.limits.linear_mps
 
 
 def test_a_number_of_nav2_stays_within_what_robot_yaml_permits() -> None:

@@ -436,6 +436,11 @@ def waiting_for_the_others(drive: FakeDrive, seconds: float = 1.0) -> Story:
     return story
 
 
+def writes(story: Story) -> list[bytes]:
+    """The addresses of the writes that it sent, in order."""
+    return [frame.data[1:4] for frame in story.sent if frame.cob_id == 0x601 and frame.data[0] >> 5 == 1]
+
+
 def written_anew(story: Story) -> str:
     """Why it is booted anew, once the others are ready and it shows that it has no power."""
     story.node.others_are_configured = lambda: True
@@ -445,10 +450,10 @@ def written_anew(story: Story) -> str:
     return story.node.absent()
 
 
-# the answer to the last write of the boot gets lost ── 0.3 s: written again ── one more object is read ── foreign write
+# the answer to the last write of the boot gets lost ── 0.3 s: written again ── the units are read ── foreign write
 def test_the_last_write_of_a_boot_hides_no_foreign_one_though_it_was_requested_twice() -> None:
     story = waiting_for_the_others(Forgetful())
-    assert [frame.data[1:4] for frame in story.sent if frame.cob_id == 0x601][-2:] == [LAST, bytes.fromhex("00 10 00")]
+    assert writes(story)[-2:] == [LAST, LAST]
     story.node.on_sdo(Frame(0x581, b"\x60" + LAST + bytes(4)), story.now_s)
     assert written_anew(story).endswith("is configured anew: another client has written its 1801h:1")
 
@@ -456,21 +461,21 @@ def test_the_last_write_of_a_boot_hides_no_foreign_one_though_it_was_requested_t
 # the last write of the boot is requested and confirmed once ── 5 s: another drive boots ── foreign write of that object
 def test_while_a_node_waits_for_the_boots_of_the_others_its_own_last_write_hides_no_foreign_one() -> None:
     story = waiting_for_the_others(FakeDrive())
-    assert [frame.data[1:4] for frame in story.sent if frame.cob_id == 0x601][-1] == LAST
+    assert writes(story)[-1] == LAST
     story.wait(5.0)
     story.node.on_sdo(Frame(0x581, b"\x60" + LAST + bytes(4)), story.now_s)
     assert written_anew(story).endswith("is configured anew: another client has written its 1801h:1")
 
 
-# requested twice, and the drive refuses 1000h ── the same, and it answers nothing more: the boot has failed
+# requested twice, and the drive refuses 60A9h ── the same, and it answers nothing more: the boot has failed
 @pytest.mark.parametrize("silent", [False, True])
-def test_a_refusal_of_that_one_more_object_is_an_answer_and_silence_is_none(silent: bool) -> None:
+def test_a_refusal_of_the_units_is_an_answer_and_silence_is_none(silent: bool) -> None:
     class Odd(Forgetful):
         def on_frame(self, frame: Frame) -> list[Frame]:
-            self.powered = self.powered and not (silent and not self.forgets and frame.data[1:4] == b"\x00\x10\x00")
+            self.powered = self.powered and not (silent and not self.forgets and frame.data[1:4] == b"\xa9\x60\x00")
             return super().on_frame(frame)
 
-    story = Story(drive=Odd(refuse_read={} if silent else {(0x1000, 0): 0x08000000}))
+    story = Story(drive=Odd(refuse_read={} if silent else {(0x60A9, 0): 0x08000000}))
     story.node.begin_boot(story.now_s)
     story.wait(3.0)
     if silent:

@@ -372,11 +372,11 @@ def repeated() -> SdoClient:
 def test_a_second_answer_to_a_write_that_was_repeated_may_come_until_the_next_transfer_is_answered() -> None:
     """t   0.4  an answer to one of two requests ── 0.5  the next transfer ── 0.6  its answer: they come in order"""
     sdo = repeated()
-    assert (sdo.may_confirm(AT), sdo.owes_confirmation) == (True, True)
+    assert sdo.may_confirm(AT)
     sdo.start(Read(0x1018, 1), 0.5)
     assert sdo.may_confirm(AT)
     sdo.on_frame(rx("43 18 10 01 11 11 00 00"), 0.6)
-    assert (sdo.may_confirm(AT), sdo.owes_confirmation, sdo.has_requested(AT)) == (False, False, True)
+    assert (sdo.may_confirm(AT), sdo.has_requested(AT)) == (False, True)
 
 
 def test_a_refusal_is_an_answer_that_settles_what_was_written_before_and_no_answer_settles_nothing() -> None:
@@ -402,7 +402,7 @@ def test_a_write_once_more_may_be_confirmed_itself() -> None:
     sdo = repeated()
     sdo.start(MONITORED, 0.5)
     sdo.on_frame(rx(CONFIRMED), 0.6)
-    assert (sdo.may_confirm(AT), sdo.owes_confirmation) == (True, False)
+    assert sdo.may_confirm(AT)
 
 
 def test_an_answer_about_an_object_of_the_watchdog_settles_nothing_it_may_have_been_requested_before() -> None:
@@ -410,11 +410,3 @@ def test_an_answer_about_an_object_of_the_watchdog_settles_nothing_it_may_have_b
     sdo.start(Read(0x6041), 0.5)
     sdo.on_frame(rx("4B 41 60 00 37 06 00 00"), 0.6)
     assert sdo.may_confirm(AT)
-
-
-def test_a_write_that_a_restart_of_the_drive_has_repeated_is_owed_a_confirmation_too() -> None:
-    sdo = client()
-    sdo.start(MONITORED, 0.0)
-    sdo.again(0.1)
-    sdo.on_frame(rx(CONFIRMED), 0.2)
-    assert sdo.owes_confirmation
