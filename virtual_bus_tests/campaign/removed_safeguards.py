@@ -12,6 +12,7 @@ from typing import Any
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
 from canbase_campaign.disk import StopDisk, WatchdogDisk
+from canbase_driver import core
 from canbase_driver.causes import Cause
 from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion import velocity_command as command
@@ -19,6 +20,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import WheelTravel
 from canbase_driver.supervision import fault_reset, state_machine, watchdog_link
 from canbase_driver.supervision.hazards import HAZARDS, Blocker, Hazard
+from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.phases import Phase
 from canbase_runtime.latch_record import CLEAR, Defect, Found
 from canbase_runtime.watchdog_view import WatchdogView
@@ -156,6 +158,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "driver:stop_record": _no_records,
+    "driver:switched_off": _put(core, "allowed_before_the_start", lambda found: Aim.ACTIVE),
     "driver:waits_for_zero": _reason(Blocker, Cause.COMMAND_NOT_ZERO),
     "driver:reset_needs_zero": _resets_while_commanded,
     "watchdog:stop_record": _watchdog_forgets,

@@ -105,6 +105,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:lets_go", ("encoder_lost", "stick_tapped"), f"watchdog:power_at_stand+{_MISSING}",
          quiet=True),
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),
+    Need("driver:switched_off", ("driver_switched_off_and_killed",)),
     Need("records:unreadable", ("driver_dies_torn", "watchdog_dies_torn", "lease_lost")),
     # drives
     Need("drives:heartbeat_consumer", ("cable_cut", "cable_cut_to_drives", "cable_cut_one_drive")),

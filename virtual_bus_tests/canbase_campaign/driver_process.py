@@ -63,7 +63,7 @@ class DriverProcess(Process):
     def begin(self) -> None:
         """A new core: nothing is booted, and its record decides what is latched."""
         self.core = DriverCore(self._robot, found=self.disk.found())
-        self.asked = ""
+        self.asked = self.asked if self.asked == "deactivate" else ""  # whatever the record says
         rates = self._robot.rates
         self._period_s, self._status_s = 1.0 / rates.control_hz, 1.0 / rates.status_hz
         self._samples = round(rates.control_hz / rates.odometry_hz)

@@ -31,6 +31,7 @@ ADDED = (
     "driver_deactivated",
     "driver_dies_torn",
     "driver_never_lets_go",
+    "driver_switched_off_and_killed",
     "scanner_clock_slewed",
     "scanner_delayed",
     "scanner_late",

@@ -103,6 +103,8 @@ class Judge:
         self._latches: dict[str, object] = {}
         self._resets_done = 0
         self._watching_at = now_s
+        self._off_since = math.inf
+        """When an operator switched motor_driver off, whatever a new process makes of it; infinity: nobody has."""
         self._pressed_at, self._unheard_at, self._lock_from = math.inf, -math.inf, -math.inf
         self._pressed_gives: dict[str, float] = {}
         """The most that each excuse gave since the button was pressed: what came late then stays late."""
@@ -381,12 +383,16 @@ class Judge:
 
     def _check_drives(self, now_s: float) -> None:
         robot = self._world.robot
+        off = self._world.driver.asked == "deactivate"
+        self._off_since = min(self._off_since, now_s) if off else math.inf
         for change in self._world.drives.changes():
             self._world.note(f"drive {change.node_id}: {change.before.name} → {change.after.name}")
             by_stranger = now_s < self._strangers.sent_at + SENT_S and self.ledger.excuse("enabling", "strange hands")
             grace_s = robot.timeouts.watchdog_s + notice_s(robot)
             if change.after is State.OPERATION_ENABLED and now_s > self._watching_at + grace_s and not by_stranger:
                 self._violate("enabling", f"drive {change.node_id}, {now_s - self._watching_at:.2f} s without watchdog")
+            if change.after is State.OPERATION_ENABLED and now_s > self._off_since + SENT_S and not by_stranger:
+                self._violate("enabling", f"drive {change.node_id}, and motor_driver was switched off")
         fastest_mps = max(self._max_wheel_mps, self._reach.fastest_mps)
         turning = self._reach.turning()
         brakes_s = fastest_mps / robot.limits.emergency_deceleration_mps2 if turning else 0.0

@@ -19,6 +19,9 @@ RESTS, DIES_AT = 4, 14
 """Of `end_before_stop`: the joystick is at rest, then deflected, so many times AGAIN_S long."""
 Do = Callable[["World", "Surroundings", Arguments, int], None]
 
+RETRY_S, AWAY_S = 0.2, 0.3
+"""A person tries again after this time; a process that was killed is started again after this time [s]."""
+
 
 def goes_on(do: Do, after: Do | None = None, every_s: float = AGAIN_S) -> tuple[Change, Change]:
     """Somebody does something again and again (with its number) until the end, then `after`."""
@@ -99,8 +102,18 @@ def deactivate(world: World, around: Surroundings, given: Arguments) -> None:
 
 
 def activate(world: World, around: Surroundings, given: Arguments) -> None:
-    """Lifecycle transition of motor_driver."""
-    world.driver.aim(Aim.ACTIVE)
+    """Lifecycle transition of motor_driver, requested again until the process runs."""
+    if world.driver.running:
+        world.driver.aim(Aim.ACTIVE)
+    else:
+        world.clock.after(RETRY_S, lambda: activate(world, around, given))
+
+
+def switch_off_and_kill(world: World, around: Surroundings, given: Arguments) -> None:
+    """Deactivated; killed during or after the stop, and started again."""
+    deactivate(world, around, given)
+    world.clock.after(given["killed_s"], world.driver.die)
+    world.clock.after(given["killed_s"] + AWAY_S, world.driver.restart)
 
 
 def touch(random: Random) -> Arguments:
@@ -131,6 +144,10 @@ PEOPLE: dict[str, Kind] = {
     "stop_requested": Kind("motor_driver is asked to stop", SHORT, nothing, ask_to_stop, stays),
     "driver_deactivated": Kind(
         "motor_driver is deactivated, and activated again", LONG, nothing, deactivate, activate
+    ),
+    "driver_switched_off_and_killed": Kind(
+        "motor_driver is deactivated, killed and started again; later it is activated", (2.5, 4.0),
+        lambda random: {"killed_s": random.uniform(0.02, 1.5)}, switch_off_and_kill, activate,
     ),
     "stick_held": Kind(
         "a stick is held through everything", (0.8, 4.0), steady,
