@@ -46,6 +46,7 @@ class BoundedComposer(Composer):
 
     def __init__(self, loader: Any = None) -> None:
         super().__init__(loader)
+        self.warn_double_anchors = False  # YAML allows them, and a file may have thousands
         self._begin()
 
     def _begin(self) -> None:

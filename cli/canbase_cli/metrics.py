@@ -19,6 +19,10 @@ def metrics(
     host: Annotated[
         str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; others than 127.0.0.1 open it.")
     ] = "127.0.0.1",
+    name: Annotated[
+        list[str] | None,
+        typer.Option("--name", metavar="HOST", help="Host name by which it is scraped, beside ADDRESS; repeatable."),
+    ] = None,
     namespace: NamespaceOption = "",
 ) -> None:
     """Serve metrics of a running robot over HTTP: OpenMetrics, at /metrics.
@@ -39,7 +43,7 @@ def metrics(
             raise
         fail(f"canbase metrics needs the Python package prometheus-client: {EXTRA}", WRONG_INPUT)
     try:
-        problem = run(robot, (host, port), arguments, lambda where: typer.echo(f"serving {where}"))
+        problem = run(robot, (host, port), arguments, lambda where: typer.echo(f"serving {where}"), name or ())
     except OSError as error:
         fail(f"{host}:{port} cannot be had: {error.strerror}; give another --port or --host", FAILED)
     if problem:

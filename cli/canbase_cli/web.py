@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import secrets
 from pathlib import Path
 from typing import Annotated, Final
@@ -14,6 +15,7 @@ from canbase_runtime.terminal import WRONG_INPUT, fail, load_config
 
 SHORTEST_TOKEN: Final = 16
 """Characters."""
+_OF_OTHERS: Final = 0o077
 
 
 def web(
@@ -53,9 +55,13 @@ def web(
 
 def _token(file: Path) -> str:
     try:
-        token = file.read_text(encoding="utf-8").strip()
+        with file.open(encoding="utf-8") as opened:
+            mode = os.fstat(opened.fileno()).st_mode
+            token = opened.read().strip()
     except (OSError, ValueError) as error:
         fail(f"{file} cannot be read: {error}", WRONG_INPUT)
+    if mode & _OF_OTHERS:
+        fail(f"{file} may be read or written by other users: chmod 600 {file}", WRONG_INPUT)
     if len(token) < SHORTEST_TOKEN or not token.isascii() or not token.isprintable() or " " in token:
         fail(f"{file}: a token has at least {SHORTEST_TOKEN} characters, and no space", WRONG_INPUT)
     return token

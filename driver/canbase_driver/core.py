@@ -56,6 +56,8 @@ from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Found, Record
 from canbase_runtime.watchdog_view import WatchdogView
 
+FARTHEST = 1e6
+"""Of a pose that is set [m, rad]: beyond it steps of a millimetre begin to get lost."""
 PAUSE = 0.5
 """A cycle that begins so late, in parts of timeouts.feedback_s, begins a new run of SYNCs."""
 LONGEST_CYCLE_S = 1.0
@@ -191,8 +193,8 @@ class DriverCore:
     def set_pose(self, pose: Pose2D, now_s: float) -> Outcome:
         """The odometry goes on from `pose`, with the covariance of a fresh start. Refused in motion."""
         commanded = self._command.motion(now_s)
-        if not (math.isfinite(pose.x_m) and math.isfinite(pose.y_m) and math.isfinite(pose.yaw_rad)):
-            return Outcome(False, f"refused: {pose} is not finite")
+        if not all(abs(value) <= FARTHEST for value in (pose.x_m, pose.y_m, pose.yaw_rad)):
+            return Outcome(False, f"refused: {pose}: expected x, y and yaw between ±{FARTHEST:.0f} (m, rad)")
         if commanded or not self._drives.stand(now_s):
             return Outcome(False, f"refused: {commanded or self._drives.turning(now_s)}; a pose is set at a standstill")
         self._feed.set_pose(pose)

@@ -11,9 +11,11 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Final
+
+from canbase_runtime.web_names import named, names
 
 Page = Callable[[bool], tuple[bytes, str]]
 """A text and its content type; true: for a client that accepts plain text and no OpenMetrics."""
@@ -31,10 +33,14 @@ class PageServer(ThreadingHTTPServer):
     block_on_close = False
     request_queue_size = MOST_OPEN
 
-    def __init__(self, address: tuple[str, int], pages: Mapping[str, Page]) -> None:
-        """`pages`: by path. Raises OSError where the address cannot be had."""
+    def __init__(self, address: tuple[str, int], pages: Mapping[str, Page], more_names: Collection[str] = ()) -> None:
+        """`pages`: by path; `more_names`: host names under which they may be opened, beside the address.
+
+        Raises OSError where the address cannot be had."""
         self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
         self._pages = {path: _Kept(page) for path, page in pages.items()}
+        self.names = frozenset((*names(address[0]), *(name.lower() for name in more_names)))
+        """Of a Host header: another one is that of a page that a stranger's DNS has moved here."""
         self._open: dict[Any, float] = {}
         self._lock = threading.Lock()
         self.failure = ""
@@ -114,6 +120,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """The page, or where the pages are."""
+        if named(self.headers.get("Host", "")) not in self.server.names:
+            self._answer(403, b"this host name is not that of the page\n", "text/plain; charset=utf-8")
+            return
         page = self.server.page(self.path.partition("?")[0])
         if page is None:
             listed = "".join(f"{path}\n" for path in self.server.paths)

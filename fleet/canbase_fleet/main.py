@@ -16,21 +16,29 @@ from canbase_fleet.vda5050 import line, state
 from canbase_runtime.private_process import guard_keys
 from canbase_runtime.sd_notify import Service
 from canbase_runtime.version import installed_version
+from canbase_runtime.web_names import authority
 
 NICENESS: Final = 10
 """Everything of the robot runs before this process."""
 NODE: Final = "canbase_metrics"
 
 
-def run(robot: Robot, address: tuple[str, int], ros_args: Sequence[str], when_ready: Callable[[str], None]) -> str:
+def run(
+    robot: Robot,
+    address: tuple[str, int],
+    ros_args: Sequence[str],
+    when_ready: Callable[[str], None],
+    more_names: Sequence[str] = (),
+) -> str:
     """Serves until SIGINT or SIGTERM. Why it failed; empty: it did not. `when_ready`: gets the address of the pages.
+    `more_names`: host names under which they may be opened, beside the address.
 
     Raises OSError where the address cannot be had, before ROS starts. Call from the main thread (signals).
     """
     guard_keys(os.environ)
     os.nice(NICENESS)
     topics: list[RobotTopics] = []
-    server = PageServer(address, _pages(robot, topics))
+    server = PageServer(address, _pages(robot, topics), more_names)
     with end_signals() as ended:
         topics.append(RobotTopics(NODE, ros_args))
         serving = threading.Thread(target=server.serve_forever, name="http", daemon=True)
@@ -49,11 +57,6 @@ def run(robot: Robot, address: tuple[str, int], ros_args: Sequence[str], when_re
             server.server_close()
             topics[0].close()
     return ""
-
-
-def authority(host: str, port: int) -> str:
-    """As in an address: an IPv6 address in brackets."""
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def _pages(robot: Robot, topics: Sequence[RobotTopics]) -> Mapping[str, Page]:

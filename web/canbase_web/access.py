@@ -120,17 +120,6 @@ class Access:
         return ("location", place), ("set-cookie", f"{self.cookie}={self.session}; Path=/; HttpOnly; SameSite=Strict")
 
 
-def authority(host: str, port: int) -> str:
-    """As it stands in an address (RFC 3986): an IPv6 address in brackets."""
-    return (f"[{host}]:{port}" if ":" in host else f"{host}:{port}").lower()
-
-
-def hosts(host: str, port: int) -> frozenset[str]:
-    """The names under which a page that is bound to `host` may be opened."""
-    local = ("127.0.0.1", "localhost", "::1")
-    return frozenset(authority(name, port) for name in (local if host in local else (host,)))
-
-
 def _same(given: str, expected: str) -> bool:
     """In a time that does not depend on how much of it is right."""
     return hmac.compare_digest(given.encode(), expected.encode())

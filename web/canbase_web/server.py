@@ -25,8 +25,9 @@ from nicegui import ui
 from canbase_config.load import Loaded
 from canbase_config.mux import MuxSource
 from canbase_runtime.terminal import FAILED, fail
+from canbase_runtime.web_names import authority, hosts
 from canbase_web import commission_page, drive_page, explained_stop, health_page, now_page, stops_page
-from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, authority, hosts
+from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access
 from canbase_web.hold import Hold
 from canbase_web.hold_socket import HoldSocket
 from canbase_web.listener import HEADERS, Listener

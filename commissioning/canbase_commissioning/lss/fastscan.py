@@ -45,7 +45,13 @@ def scan_for_all(bitrate: int, likely: tuple[Identity, ...] = (), taken: Collect
                 f"two drives have the same identity, {one}, or it does not leave the scan: connect one at a time"
             )
         found.append(one)
-        yield from _leave(next(free))
+        node_id = next(free, None)
+        if node_id is None:
+            raise ConversationError(
+                f"{len(found)} drives without a node id have answered, and no node id is free: no bus has so many; "
+                "one device invents them. Connect one drive at a time"
+            )
+        yield from _leave(node_id)
         likely = (one, *likely)[:GUESSES]
 
 

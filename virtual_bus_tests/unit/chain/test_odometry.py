@@ -136,7 +136,9 @@ def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -
     world.command = Twist2D.ZERO
     world.run(1.0)
     assert world.snapshot.odometry.pose.x_m > 0.1
-    assert not world.core.set_pose(Pose2D(math.nan, 0.0, 0.0), world.now_s).done
+    for wrong in (math.nan, math.inf, 1e300, -1e300, 1.000001e6):
+        for pose in (Pose2D(wrong, 0.0, 0.0), Pose2D(0.0, wrong, 0.0), Pose2D(0.0, 0.0, wrong)):
+            assert not world.core.set_pose(pose, world.now_s).done, pose
     assert world.snapshot.odometry.pose_resets == 0
     assert world.core.set_pose(Pose2D(1.0, 2.0, math.pi / 2), world.now_s).done
     fresh = world.snapshot

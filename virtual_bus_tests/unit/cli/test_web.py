@@ -29,8 +29,18 @@ def test_an_address_that_no_browser_can_open_is_refused(host: str) -> None:
 def test_a_token_that_is_easy_to_guess_or_does_not_fit_an_address_is_refused(tmp_path: Path, token: str) -> None:
     file = tmp_path / "token"
     file.write_text(token, encoding="utf-8")
+    file.chmod(0o600)
     code, said = refused("--token-file", str(file))
     assert (code, "at least 16 characters" in said) == (2, True)
+
+
+@pytest.mark.parametrize("mode", [0o604, 0o640, 0o620, 0o602])
+def test_a_token_file_that_others_may_read_or_write_is_refused(tmp_path: Path, mode: int) -> None:
+    file = tmp_path / "token"
+    file.write_text("x" * 24, encoding="utf-8")
+    file.chmod(mode)
+    code, said = refused("--token-file", str(file))
+    assert (code, "may be read or written by other users: chmod 600" in said) == (2, True)
 
 
 def test_a_token_file_that_is_not_there_is_named(tmp_path: Path) -> None:

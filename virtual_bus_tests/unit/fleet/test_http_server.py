@@ -21,7 +21,7 @@ class Site:
 
     def __init__(self) -> None:
         self.made: list[bool] = []
-        self.server = PageServer(("127.0.0.1", 0), {"/metrics": self.page})
+        self.server = PageServer(("127.0.0.1", 0), {"/metrics": self.page}, ["Robot1"])
         self.port = self.server.server_port
         threading.Thread(target=self.server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
 
@@ -70,6 +70,17 @@ def test_the_page_and_nothing_else(site: Site) -> None:
     assert site.get("/metrics?name=canbase_estop") == (200, b"hello\n")
     assert site.get("/etc/passwd") == (404, b"/metrics\n")
     assert site.get(method="POST")[0] == 501
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [("127.0.0.1", 200), ("LOCALHOST:9", 200), ("[::1]:9464", 200), ("robot1:9464", 200), ("robot1.evil.example", 403),
+     ("evil.example:9464", 403), ("127.0.0.1.evil.example", 403), ("", 403)],
+)  # fmt: skip
+def test_a_page_under_a_name_of_a_stranger_is_not_shown(site: Site, host: str, status: int) -> None:
+    """DNS rebinding: the browser of somebody in the network opens this address under another name."""
+    assert site.get(Host=host)[0] == status
+    assert bool(site.made) is (status == 200)
 
 
 def test_a_storm_of_requests_is_answered_with_one_page(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:

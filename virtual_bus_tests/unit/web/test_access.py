@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, Request, Verdict, hosts, parsed
+from canbase_runtime.web_names import hosts
+from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, Request, Verdict, parsed
 
 TOKEN, SESSION = "token-of-the-address", "session-of-the-cookie"
 NAME = COOKIE.format(port=8080)

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 
 import pytest
 
+from canbase_runtime.web_names import hosts
 from canbase_web import listener as listener_module
-from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access, hosts
+from canbase_web.access import COOKIE, MOST_BODY_BYTES, Access
 from canbase_web.listener import MOST_HEAD_BYTES, Listener
 from support.browser import free_tcp_port
 
