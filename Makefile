@@ -82,7 +82,7 @@ same-frames: build/compiled/ready ## SEEDS=10 scenarios and robots, interpreted 
 
 .PHONY: teeth
 teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign has to find it missing; ONLY=filter:estop one
-	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.teeth $(ONLY)
+	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.teeth --write $(ONLY)
 
 .PHONY: stops
 stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some

@@ -1,10 +1,13 @@
 """Safeguards that can be taken out, one at a time: a campaign that then finds nothing would prove nothing.
 
-Rows are dropped from the tables of watchdog and driver; the others are one method each.
+Rows are dropped from the tables of watchdog and driver, which are read from their modules: a new check, detector, rung,
+hazard or blocker is here at once, and test_teeth.py fails until safeguard_needs.py has its row. The others are one
+method each.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -16,23 +19,32 @@ from canbase_driver import core
 from canbase_driver.causes import Cause
 from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion import velocity_command as command
+from canbase_driver.motion.braking import Braking
 from canbase_driver.motion.kinematics import Twist2D
+from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import WheelTravel
 from canbase_driver.supervision import fault_reset, state_machine, watchdog_link
-from canbase_driver.supervision.hazards import HAZARDS, Blocker, Hazard
+from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS, Blocker, Hazard
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.phases import Phase
 from canbase_runtime.latch_record import CLEAR, Defect, Found
 from canbase_runtime.watchdog_view import WatchdogView
 from canbase_sim.cia301.heartbeat import HeartbeatConsumer
 from canbase_velocity import filter_state, lock, mux, neutral, obstacle, safety_filter
+from canbase_velocity.decision import PASSED
 from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.frozen import FrozenWatch
 from canbase_velocity.scan import Scan
 from canbase_velocity.sweep import NO_TOUCH
-from canbase_watchdog import policy
+from canbase_watchdog import frames, ladder, lease, policy, stopper, watchdog
+from canbase_watchdog.hard_braking import HardBraking
+from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.latch import Past
+from canbase_watchdog.slowing import SlowingWatch
+from canbase_watchdog.standing import StandWatch
+from canbase_watchdog.stopper import Stopper
 from canbase_watchdog.trip_cause import FINE, TripCause
+from canbase_watchdog.view import Axis
 from canbase_watchdog.watchdog import State, Watchdog
 
 
@@ -143,11 +155,102 @@ def _brakes_softly_too(take_out: Callable[[], None]) -> Callable[[], None]:
     return both
 
 
+def _sign(name: str) -> Callable[[], None]:
+    return _drop(policy, lambda row: getattr(row, "name", "") != name)
+
+
+def _no_quick_stop() -> None:
+    """The PDO is sent from "disable voltage" on."""
+    word = Stopper._stop_word
+    late = Step.DISABLE_VOLTAGE
+    Stopper._stop_word = lambda self, now_s: word(self, now_s) if self.climb.step >= late else []  # type: ignore[method-assign]
+
+
+def _no_pre_operational() -> None:
+    Stopper._pre_operational = lambda self, now_s: []  # type: ignore[method-assign]
+    del stopper._WORD_BY_STEP[Step.PRE_OPERATIONAL]
+
+
+def _no_disable_voltage() -> None:
+    """Whatever the rung, PDO and SDO say quick stop."""
+    frames.disable_voltage = frames.quick_stop
+    stopper._WORD_BY_STEP.update(dict.fromkeys(stopper._WORD_BY_STEP, frames.QUICK_STOP_WORD))
+
+
+WITHOUT_RUNG: dict[Step, Callable[[], None]] = {
+    Step.QUICK_STOP: _no_quick_stop,
+    Step.PRE_OPERATIONAL: _no_pre_operational,
+    Step.DISABLE_VOLTAGE: _no_disable_voltage,
+    Step.HEARTBEAT_WITHHELD: _put(Watchdog, "_beats", property(lambda self: True)),
+    Step.RESET_NODE: _put(Stopper, "_reset_node", lambda self, now_s: []),
+}
+"""The ladder is climbed as it was; what the rung sends is not sent."""
+
+
+def _both(one: Callable[[], None], other: Callable[[], None]) -> Callable[[], None]:
+    def take_out() -> None:
+        one()
+        other()
+
+    return take_out
+
+
+def _any_lease(datagram: bytes) -> lease.Lease | lease.Refusal:
+    """Whatever its magic number, its checksum and its values are."""
+    if len(datagram) != lease.LAYOUT.size:
+        return lease.Refusal.LENGTH
+    _magic, sequence, stamp_ns, linear, angular, flags, _checksum = lease.LAYOUT.unpack(datagram)
+    return lease.Lease(sequence, stamp_ns, linear, angular, flags)
+
+
+def _at_once(
+    self: Limiter, current: MotionState, target: Twist2D, dt_s: float, *, emergency: bool = False
+) -> MotionState:
+    return MotionState(Twist2D.ZERO if emergency else self.limit(target))
+
+
+def _name(cause: Cause) -> str:
+    return cause.value.replace(" ", "_")
+
+
+NEVER = property(lambda self: False)
+SIGNS = (*policy.OF_THE_SETPOINTS, *policy.IMPLAUSIBLE, *policy.MISSING)
+"""Detectors of one row of policy.CHECKS each."""
+
 SAFEGUARDS: dict[str, Callable[[], None]] = {
+    **{f"watchdog:{sign.name}": _sign(sign.name) for sign in SIGNS},
+    **{f"ladder:{step.name.lower()}": WITHOUT_RUNG[step] for step in RUNGS},
+    "ladder:braking": _put(ladder.Braking, "allowed_mps", lambda self, from_mps, elapsed_s: math.inf),
+    "ladder:slowing": _put(SlowingWatch, "fails", NEVER),
+    "ladder:faulty_sensor": _put(Axis, "trusted", property(lambda self: True)),
+    "ladder:sudden": _both(_put(StandWatch, "sudden", NEVER), _put(StandWatch, "unproven", NEVER)),
+    "watchdog:hard_braking": _put(HardBraking, "on_lease", lambda self, lease, now_s: None),
+    "watchdog:lease_times": _put(lease, "judge", lambda new, last, timeout_s, now_s: None),
+    "watchdog:lease_form": _put(lease, "parse", _any_lease),
+    "watchdog:reset_needs_stand": _both(
+        _put(Stopper, "settled", property(lambda self: True)), _put(Stopper, "is_fresh", lambda self, now_s: True)
+    ),
+    "watchdog:reset_needs_end_of_cause": _put(policy, "stands", lambda verdict, view, config, now_s: False),
+    "watchdog:reset_needs_zero": _put(watchdog, "velocity_ordered", lambda view, config, now_s: False),
+    **{f"power:{_name(row.cause)}": _reason(Blocker, row.cause) for row in BLOCKERS},
+    "driver:speed_limit": _put(Limiter, "limit", lambda self, target: target),
+    "driver:acceleration_limit": _put(Limiter, "step", _at_once),
+    "driver:braking": _put(Braking, "fails", lambda self, speed_mps, now_s: False),
+    "filter:speed": _put(obstacle, "speed_factor", lambda twist, linear_mps, angular_radps: 1.0),
+    "filter:growth": _put(safety_filter, "_growth", lambda twist, inputs, ceiling: (twist, PASSED)),
+    "filter:limit_zones": _put(obstacle, "zone_factor", lambda twist, zone, sight: 1.0),
+    "filter:speed_limit": _put(safety_filter, "_lowered", lambda inputs: PASSED),
+    "filter:uncommissioned": _put(safety_filter.FilterConfig, "uncommissioned", property(lambda self: "")),
+    "filter:blind_mps": _put(safety_filter, "_unseen", lambda inputs, config: []),
+    "filter:unscanned": _put(obstacle, "is_blind", lambda order, sight, geometry: False),
+    "filter:scan": _put(safety_filter, "_scan", lambda inputs: None),
+    "filter:brakes_hard": _put(safety_filter, "brakes_hard", lambda inputs, config: False),
+    "mux:lock": _put(lock.Lock, "hear", lambda self, locked, now_s: None),
+    "mux:late_commands": _put(mux._Source, "why_late", property(lambda self: "")),
     **{f"watchdog:{check.cause.name.lower()}": _trip(check.cause) for check in policy.CHECKS},
     "watchdog:all": _all_trips,
     "watchdog:latch": _no_latch,
-    **{f"driver:{row.cause.value.replace(' ', '_')}": _reason(Hazard, row.cause) for row in HAZARDS},
+    **{f"driver:{_name(row.cause)}": _reason(Hazard, row.cause) for row in HAZARDS},
     "driver:latch": _driver_forgets,
     "driver:watchdog_missing": _brakes_softly_too(_reason(Hazard, Cause.WATCHDOG_MISSING)),
     "driver:asks_for_watchdog": _brakes_softly_too(
@@ -159,7 +262,6 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "driver:stop_record": _no_records,
     "driver:switched_off": _put(core, "allowed_before_the_start", lambda found: Aim.ACTIVE),
-    "driver:waits_for_zero": _reason(Blocker, Cause.COMMAND_NOT_ZERO),
     "driver:reset_needs_zero": _resets_while_commanded,
     "watchdog:stop_record": _watchdog_forgets,
     "records:unreadable": _unreadable_is_clear,

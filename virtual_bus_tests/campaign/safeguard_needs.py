@@ -6,15 +6,7 @@ Each name of removed_safeguards.py has a row. Where several layers hold the same
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-
-from canbase_config.robot import Robot
-
-
-def any_robot(robot: Robot) -> bool:
-    """Every robot can show it."""
-    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +16,12 @@ class Need:
     safeguard: str
     faults: tuple[str, ...]
     beside: str = ""
-    robots: Callable[[Robot], bool] = any_robot
     quiet: bool = False
     """No source orders motion but in a fault."""
     proof: str = ""
     """Why no scenario can need it alone: then one has to show that all of them together are needed."""
+    undrawn: str = ""
+    """Why the campaign cannot show it: what it does not draw. teeth.json has no row of it."""
 
     @property
     def taken_out(self) -> str:
@@ -45,9 +38,16 @@ _HELD = ("stick_held", "drive_fault", "resets_too_early")
 _LIES = ("encoder_frozen", "frozen_encoder", "stuck_velocity", "encoder_jumping", "encoder_intermittent")
 _OFF = ("drive_sto", "drive_fault")
 _DRIVER_SEES = "driver:drive_fault+driver:drive_restarted+driver:drive_silent+driver:drive_disabled"
-_DRIVER_HEEDS = "driver:waits_for_zero+driver:reset_needs_zero+driver:zero_before_motion"
+_DRIVER_HEEDS = "power:command_not_zero+driver:reset_needs_zero+driver:zero_before_motion"
 _MISSING = "watchdog:motion_missing+driver:stalled"
 _MOTION = f"watchdog:feedback_implausible+{_MISSING}+watchdog:twist_outside"
+_SENSORS = (
+    "watchdog:halted+watchdog:jolts+watchdog:ghost+watchdog:drift+watchdog:unseen+watchdog:vain+watchdog:strained+"
+    "watchdog:behind+driver:stalled+watchdog:twist_outside+watchdog:motion_outside"
+)
+_NO_MOTION = ("encoder_lost", "wheel_blocked", "encoder_intermittent", "frozen_encoder")
+_SLOW = ("wheel_limited", "motor_weak", "wheel_blocked")
+_RUNGS = "ladder:pre_operational+ladder:disable_voltage+ladder:heartbeat_withheld"
 _DEAF = "a watchdog that cannot send stops nothing; what it would trip for stays tripped until it can send again"
 _AWAY = "driver:watchdog_missing+drives:heartbeat_consumer"
 
@@ -77,6 +77,51 @@ NEEDS: tuple[Need, ...] = (
     Need("watchdog:all", (*_MAD, "lease_lost")),
     Need("watchdog:latch", ("velocity_hangs", "lease_lost", "driver_hangs")),
     Need("watchdog:stop_record", ("all_processes_restart", "watchdog_dies", "encoder_lost", "lease_lost")),
+    # watchdog: detectors of the rows above, of policy.OF_THE_SETPOINTS, IMPLAUSIBLE and MISSING
+    Need("watchdog:halt", ("driver_ignores_zero", "driver_repeats"), "watchdog:creep"),
+    Need("watchdog:creep", ("driver_ignores_zero", "driver_repeats"), "watchdog:halt"),
+    Need("watchdog:pair", _MAD),
+    Need("watchdog:halted", _LIES, "watchdog:twist_outside+" + _MISSING),
+    Need("watchdog:jolts", _LIES, _SENSORS.replace("watchdog:jolts+", "")),
+    Need("watchdog:ghost", _LIES, _SENSORS.replace("watchdog:ghost+", "")),
+    Need("watchdog:drift", _LIES, _SENSORS.replace("watchdog:drift+", "")),
+    Need("watchdog:unseen", _NO_MOTION, _SENSORS.replace("watchdog:unseen+", "")),
+    Need("watchdog:vain", _NO_MOTION, _SENSORS.replace("watchdog:vain+", "")),
+    Need("watchdog:strained", (*_NO_MOTION, "encoder_scaled"), _SENSORS.replace("watchdog:strained+", "")),
+    Need("watchdog:behind", _SLOW, _SENSORS.replace("watchdog:behind+", "")),
+    # watchdog: rungs of ladder.RUNGS, and what climbs them
+    Need("ladder:quick_stop", ("driver_repeats", *_VELOCITY_GONE, *_DRIVER_GONE),
+         f"{_RUNGS}+drives:heartbeat_consumer"),
+    Need("ladder:pre_operational", ("driver_repeats", "driver_ignores_zero", "encoder_lost"), "ladder:quick_stop"),
+    Need("ladder:disable_voltage", ("encoder_lost", "drive_unbraked", "encoder_frozen"), "ladder:heartbeat_withheld"),
+    Need("ladder:heartbeat_withheld", ("encoder_lost", "drive_unbraked", "encoder_frozen"), "ladder:disable_voltage"),
+    Need("ladder:reset_node", ("encoder_lost", "drive_unbraked", "encoder_frozen"),
+         "ladder:disable_voltage+ladder:heartbeat_withheld"),
+    Need("ladder:braking", ("drive_unbraked", "encoder_scaled"), "ladder:slowing+driver:braking"),
+    Need("ladder:slowing", ("drive_unbraked", "encoder_scaled"), "ladder:braking+driver:braking"),
+    Need("ladder:faulty_sensor", ("encoder_lost", *_LIES), "ladder:braking+ladder:slowing"),
+    Need("ladder:sudden", ("encoder_lost", *_LIES)),
+    # watchdog: what leases and resets have to be
+    Need("watchdog:hard_braking", ("obstacle", "estop_pressed"), "filter:obstacle"),
+    Need("watchdog:lease_times", ("velocity_hangs", "velocity_hiccup", "lease_garbage")),
+    Need("watchdog:lease_form", ("lease_garbage",)),
+    Need("watchdog:reset_needs_stand", ("encoder_lost", "resets_too_early", "lease_lost")),
+    Need("watchdog:reset_needs_end_of_cause", ("lease_lost", "resets_too_early", "drive_silent")),
+    Need("watchdog:reset_needs_zero", ("stick_held", "resets_too_early"), _DRIVER_HEEDS + "+mux:neutral_start"),
+    # driver: rows of canbase_driver.supervision.hazards.BLOCKERS
+    Need("power:stop_requested", ("stop_requested",)),
+    Need("power:bus_failed", ("bus_problem",)),
+    Need("power:watchdog_tripped", ("lease_lost", "resets_too_early", "driver_hangs")),
+    Need("power:not_configured", ("driver_deactivated", "driver_dies")),
+    Need("power:drive_missing", ("drive_power_cycle", "drive_resets")),
+    Need("power:booting", ("drive_power_cycle", "drive_resets", "driver_dies")),
+    Need("power:stop_unproven", (), undrawn="every robot of the campaign is commissioned"),
+    Need("power:drive_fault", ("drive_fault", "drive_sto")),
+    Need("power:drive_silent", ("drive_silent", "feedback_lost", "cable_cut_one_drive")),
+    Need("power:watchdog_missing", _WATCHDOG_GONE),
+    Need("power:inactive", ("driver_deactivated",)),
+    Need("power:resetting", ("resets_too_early", "drive_fault")),
+    Need("power:not_standing", ("resets_too_early", "drive_power_cycle", "driver_dies")),
     # driver: rows of canbase_driver.supervision.hazards.HAZARDS
     Need("driver:bus_failed", ("bus_problem",), f"driver:watchdog_tripped+{_DRIVER_SEES}+{_AWAY}"),
     Need("driver:watchdog_tripped", ("lease_lost", "driver_repeats", "encoder_lost"), "driver:drive_disabled"),
@@ -97,9 +142,9 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:latch", ("watchdog_hangs", "drive_fault")),
     Need("driver:asks_for_watchdog", _WATCHDOG_GONE),
     Need("driver:command_timeout", _VELOCITY_GONE, "watchdog:lease_lost"),
-    Need("driver:zero_before_motion", _HELD, "mux:neutral_start+driver:waits_for_zero+driver:reset_needs_zero"),
-    Need("driver:waits_for_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:reset_needs_zero"),
-    Need("driver:reset_needs_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:waits_for_zero"),
+    Need("driver:zero_before_motion", _HELD, "mux:neutral_start+power:command_not_zero+driver:reset_needs_zero"),
+    Need("power:command_not_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+driver:reset_needs_zero"),
+    Need("driver:reset_needs_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+power:command_not_zero"),
     Need("driver:command_is_finite", ("straight_to_cmd_vel",)),
     Need("driver:odometry_jump_guard", ("frozen_encoder",), f"{_MOTION}+watchdog:motion_outside"),
     Need("driver:lets_go", ("encoder_lost", "stick_tapped"), f"watchdog:power_at_stand+{_MISSING}",
@@ -107,6 +152,12 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),
     Need("driver:switched_off", ("driver_switched_off_and_killed",)),
     Need("records:unreadable", ("driver_dies_torn", "watchdog_dies_torn", "lease_lost")),
+    Need("driver:speed_limit", ("straight_to_cmd_vel", "two_hands", "stick_held"),
+         "watchdog:target_outside+filter:speed"),
+    Need("driver:acceleration_limit", ("straight_to_cmd_vel", "two_hands", "stick_held"),
+         f"watchdog:target_outside+{_MOTION}+watchdog:motion_outside"),
+    Need("driver:braking", ("drive_ignores_setpoints", "drive_unbraked"),
+         f"driver:did_not_stop+{_MOTION}+watchdog:motion_outside"),
     # drives
     Need("drives:heartbeat_consumer", ("cable_cut", "cable_cut_to_drives", "cable_cut_one_drive")),
     # velocity
@@ -114,6 +165,17 @@ NEEDS: tuple[Need, ...] = (
     Need("mux:lock_publishers", ("two_on_a_lock", "stick_held")),
     Need("mux:neutral_start", _HELD, _DRIVER_HEEDS),
     Need("filter:zero_after_estop", ("estop_pressed", "stick_held"), "mux:neutral_start"),
+    Need("filter:speed", ("two_hands", "stick_held", "button_tapped"), "driver:speed_limit"),
+    Need("filter:growth", (), undrawn="no robot of the campaign has safety.ceiling"),
+    Need("filter:limit_zones", (), undrawn="no robot of the campaign has safety.limit_zones"),
+    Need("filter:speed_limit", (), undrawn="nobody publishes speed_limit"),
+    Need("filter:uncommissioned", (), undrawn="every robot of the campaign is commissioned"),
+    Need("filter:blind_mps", ("scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead", "scan_stale")),
+    Need("filter:unscanned", ("stick_held", "two_hands")),
+    Need("filter:scan", ("scan_stale", "obstacle")),
+    Need("filter:brakes_hard", ("obstacle", "estop_pressed")),
+    Need("mux:lock", ("two_on_a_lock",)),
+    Need("mux:late_commands", ("orders_delayed", "topic_late")),
     Need("filter:late_scans", ("scanner_late",)),
     Need("filter:command", ("mux_lossy",)),
     Need("filter:estop", ("estop_pressed", "estop_stale")),

@@ -138,7 +138,7 @@ def forgets_the_second(world: World) -> None:
 STOPPED = fault("stop_requested", 0.6, 0.5)
 SHORT, LONG = (stick(0.4, 0.0, 0.0, 0.5),), (stick(0.6, 0.0, 0.0, 9.0),)
 UNWATCHED = "watchdog:all+drives:heartbeat_consumer"
-UNMINDED = "mux:neutral_start+driver:waits_for_zero+driver:reset_needs_zero+driver:zero_before_motion"
+UNMINDED = "mux:neutral_start+power:command_not_zero+driver:reset_needs_zero+driver:zero_before_motion"
 CUT, WALL = fault("cable_cut_to_drives", 0.8, 3.5), fault("obstacle", 0.6, 3.0, margin_m=0.1)
 BLIND = fault("scanner_blind_ahead", 0.8, 3.5, margin_m=None)
 SYNC = fault("second_master_sync", 0.75, 0.02, on=True)

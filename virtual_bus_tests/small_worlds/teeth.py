@@ -26,7 +26,7 @@ def _with(*events: str) -> Bounds:
 
 
 _RECORDS = "driver:stop_record+watchdog:stop_record"
-_NEUTRAL = "mux:neutral_start+driver:waits_for_zero+driver:zero_before_motion"
+_NEUTRAL = "mux:neutral_start+power:command_not_zero+driver:zero_before_motion"
 _MOTION = "watchdog:motion_missing+driver:stalled+watchdog:twist_outside"
 _LEASES = "watchdog:lease_lost+watchdog:motion_outside+watchdog:target_outside+driver:command_timeout"
 

@@ -120,13 +120,26 @@ def _target_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict
                 f"the leases allow {low:.3f} to {high:.3f} m/s (tolerance {slack:.3f} m/s)"
             )
             return Verdict(TripCause.TARGET_OUTSIDE, axis.drive.node_id, detail)
-    if view.halt:
-        return Verdict(TripCause.TARGET_OUTSIDE, 0, view.halt)
-    if view.creep:
-        return Verdict(TripCause.TARGET_OUTSIDE, 0, f"{view.creep}, while the leases allow no motion")
-    if view.skew:
-        return Verdict(TripCause.TARGET_OUTSIDE, 0, f"left and right wheels are ordered {view.skew}")
+    for sign in OF_THE_SETPOINTS:
+        detail = sign.detail(view)
+        if detail:
+            return Verdict(TripCause.TARGET_OUTSIDE, 0, detail)
     return FINE
+
+
+@dataclass(frozen=True, slots=True)
+class BaseSign:
+    """One thing that is wrong with the setpoints of all wheels together. `detail`: in words; empty: it is not so."""
+
+    name: str
+    detail: Callable[[View], str]
+
+
+OF_THE_SETPOINTS = (
+    BaseSign("halt", lambda view: view.halt),
+    BaseSign("creep", lambda view: f"{view.creep}, while the leases allow no motion" if view.creep else ""),
+    BaseSign("pair", lambda view: f"left and right wheels are ordered {view.skew}" if view.skew else ""),
+)
 
 
 def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
@@ -150,76 +163,133 @@ def _overspeed(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     return FINE
 
 
+@dataclass(frozen=True, slots=True)
+class WheelSign:
+    """One thing that is wrong with what a wheel shows. `detail`: in words; empty: it is not so."""
+
+    name: str
+    detail: Callable[[Axis, WatchdogConfig], str]
+
+
+def _first(signs: tuple[WheelSign, ...], axis: Axis, config: WatchdogConfig) -> str:
+    for sign in signs:
+        detail = sign.detail(axis, config)
+        if detail:
+            return f"{axis.drive.joint} {detail}"
+    return ""
+
+
 def _feedback_implausible(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
-        detail = _implausible(axis, config) if axis.powered else ""
+        detail = _first(IMPLAUSIBLE, axis, config) if axis.powered else ""
         if detail:
-            return Verdict(TripCause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, f"{axis.drive.joint} {detail}")
+            return Verdict(TripCause.FEEDBACK_IMPLAUSIBLE, axis.drive.node_id, detail)
     return FINE
 
 
-def _implausible(axis: Axis, config: WatchdogConfig) -> str:
-    """What is wrong with the sensor of a wheel, in words; empty: nothing."""
-    evidence, samples = axis.evidence, config.feedback_samples
-    if evidence.halted >= samples:
-        return (
-            f"reports standstill at once, and no motion since, with {evidence.setpoint_mps:.3f} m/s ordered: "
-            f"no wheel stops so fast (watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
-        )
-    if evidence.jolts >= config.jolts:
-        return (
-            f"reports {axis.velocity_mps:.3f} m/s, and {evidence.jolts} changes of speed that no wheel can do "
-            f"(watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
-        )
-    if evidence.ghost:
-        return (
-            f"reports {axis.velocity_mps:.3f} m/s, {evidence.ghost_m:.3f} m in all, and its encoder does not move: "
-            "its drive pushes against a motion that there is not; see encoder"
-        )
-    if axis.feedback.implausible >= samples:
-        return (
-            f"reports {axis.velocity_mps:.3f} m/s, and its encoder contradicts it: "
-            f"{axis.feedback.drift_m:.3f} m apart (allowed {config.travel_tolerance_m:.3f} m)"
-        )
-    return ""
+def _halted(axis: Axis, config: WatchdogConfig) -> str:
+    if axis.evidence.halted < config.feedback_samples:
+        return ""
+    return (
+        f"reports standstill at once, and no motion since, with {axis.evidence.setpoint_mps:.3f} m/s ordered: "
+        f"no wheel stops so fast (watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
+    )
+
+
+def _jolts(axis: Axis, config: WatchdogConfig) -> str:
+    if axis.evidence.jolts < config.jolts:
+        return ""
+    return (
+        f"reports {axis.velocity_mps:.3f} m/s, and {axis.evidence.jolts} changes of speed that no wheel can do "
+        f"(watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
+    )
+
+
+def _ghost(axis: Axis, config: WatchdogConfig) -> str:
+    if not axis.evidence.ghost:
+        return ""
+    return (
+        f"reports {axis.velocity_mps:.3f} m/s, {axis.evidence.ghost_m:.3f} m in all, and its encoder does not move: "
+        "its drive pushes against a motion that there is not; see encoder"
+    )
+
+
+def _drift(axis: Axis, config: WatchdogConfig) -> str:
+    if axis.feedback.implausible < config.feedback_samples:
+        return ""
+    return (
+        f"reports {axis.velocity_mps:.3f} m/s, and its encoder contradicts it: "
+        f"{axis.feedback.drift_m:.3f} m apart (allowed {config.travel_tolerance_m:.3f} m)"
+    )
+
+
+IMPLAUSIBLE = (
+    WheelSign("halted", _halted),
+    WheelSign("jolts", _jolts),
+    WheelSign("ghost", _ghost),
+    WheelSign("drift", _drift),
+)
+"""What is wrong with the sensor of a wheel with power."""
 
 
 def _motion_missing(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
-        detail = _missing(axis, config) if axis.enabled else ""
+        detail = _first(MISSING, axis, config) if axis.enabled else ""
         if detail:
-            return Verdict(TripCause.MOTION_MISSING, axis.drive.node_id, f"{axis.drive.joint} {detail}")
+            return Verdict(TripCause.MOTION_MISSING, axis.drive.node_id, detail)
     return FINE
 
 
-def _missing(axis: Axis, config: WatchdogConfig) -> str:
-    """What of the ordered motion a wheel does not show, in words; empty: nothing."""
+def _unseen(axis: Axis, config: WatchdogConfig) -> str:
     evidence = axis.evidence
-    if evidence.unseen:
-        return (
-            f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for "
-            f"{max(evidence.unseen_s, evidence.both_s):.3f} s and {evidence.both_m:.3f} m of its orders (allowed "
-            f"{config.motion_missing_s:.3f} s and {config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that "
-            f"way: watchdog.motion_missing_m); it reports "
-            f"{axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
-        )
-    if axis.push.vain_s >= config.motion_missing_s:
-        return (
-            f"is pushed with {_torque(axis)} and shows no motion for {axis.push.vain_s:.3f} s (allowed "
-            f"{config.motion_missing_s:.3f} s), ordered {evidence.setpoint_mps:.3f} m/s: see encoder, motor, wheel"
-        )
-    if evidence.strained_s >= config.motion_missing_s:
-        return (
-            f"is pushed with {_torque(axis)} and gets no faster than {axis.velocity_mps:.3f} m/s for "
-            f"{evidence.strained_s:.3f} s (allowed {config.motion_missing_s:.3f} s), ordered "
-            f"{evidence.setpoint_mps:.3f} m/s: its encoder may lose counts, or its load is too heavy"
-        )
-    if evidence.behind_s >= config.slow_wheel_s:
-        return (
-            f"turns at {axis.velocity_mps:.3f} m/s, its setpoints order {evidence.ordered_mps:.3f} m/s for "
-            f"{evidence.behind_s:.3f} s (allowed {config.slow_wheel_s:.3f} s; slow ramps: watchdog.slowest_ramp_mps2)"
-        )
-    return ""
+    if not evidence.unseen:
+        return ""
+    return (
+        f"is ordered {evidence.setpoint_mps:.3f} m/s, and its encoder has not moved for "
+        f"{max(evidence.unseen_s, evidence.both_s):.3f} s and {evidence.both_m:.3f} m of its orders (allowed "
+        f"{config.motion_missing_s:.3f} s and {config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that "
+        f"way: watchdog.motion_missing_m); it reports "
+        f"{axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
+    )
+
+
+def _vain(axis: Axis, config: WatchdogConfig) -> str:
+    if axis.push.vain_s < config.motion_missing_s:
+        return ""
+    return (
+        f"is pushed with {_torque(axis)} and shows no motion for {axis.push.vain_s:.3f} s (allowed "
+        f"{config.motion_missing_s:.3f} s), ordered {axis.evidence.setpoint_mps:.3f} m/s: see encoder, motor, wheel"
+    )
+
+
+def _strained(axis: Axis, config: WatchdogConfig) -> str:
+    evidence = axis.evidence
+    if evidence.strained_s < config.motion_missing_s:
+        return ""
+    return (
+        f"is pushed with {_torque(axis)} and gets no faster than {axis.velocity_mps:.3f} m/s for "
+        f"{evidence.strained_s:.3f} s (allowed {config.motion_missing_s:.3f} s), ordered "
+        f"{evidence.setpoint_mps:.3f} m/s: its encoder may lose counts, or its load is too heavy"
+    )
+
+
+def _behind(axis: Axis, config: WatchdogConfig) -> str:
+    evidence = axis.evidence
+    if evidence.behind_s < config.slow_wheel_s:
+        return ""
+    return (
+        f"turns at {axis.velocity_mps:.3f} m/s, its setpoints order {evidence.ordered_mps:.3f} m/s for "
+        f"{evidence.behind_s:.3f} s (allowed {config.slow_wheel_s:.3f} s; slow ramps: watchdog.slowest_ramp_mps2)"
+    )
+
+
+MISSING = (
+    WheelSign("unseen", _unseen),
+    WheelSign("vain", _vain),
+    WheelSign("strained", _strained),
+    WheelSign("behind", _behind),
+)
+"""What of the ordered motion an enabled wheel does not show."""
 
 
 def _torque(axis: Axis) -> str:
