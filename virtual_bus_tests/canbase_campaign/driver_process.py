@@ -60,6 +60,11 @@ class DriverProcess(Process):
         """It reports a latched stop."""
         return self.core.state is DriverState.LATCHED
 
+    @property
+    def enabled(self) -> bool:
+        """It reports that the base follows commands."""
+        return self.core.state is DriverState.ENABLED
+
     def begin(self) -> None:
         """A new core: nothing is booted, and its record decides what is latched."""
         self.core = DriverCore(self._robot, found=self.disk.found())

@@ -1,6 +1,7 @@
 """What of a world decides about its future, as one number: two worlds with the same number go on alike.
 
-Times count as ages, and an age beyond `OLD_S` is old; counters and paths that no decision looks at are left out.
+Times count as ages, and an age beyond `OLD_S` is old; counters and paths that no decision looks at are left out, each
+for a reason (IGNORED). merged.py steps worlds that count as the same side by side.
 Two worlds that differ in the fourth digit of a speed count as the same: that is the one rounding here.
 """
 
@@ -29,37 +30,59 @@ PLAIN = 2
 """The version of marshal's format in which equal values give equal bytes."""
 OLD_S = 1.05
 """Longer than any timeout of the small robot that ends in what the properties look at: what is older has run out."""
-EPOCH_S = 50.0
-"""A number nearer than this to the present is a time, if it is not before BEGAN_S: nothing else is as large."""
+EPOCH_S = 70.0
+"""A number nearer than this to the present is a time, if it is not before BEGAN_S: nothing else is as large. The
+longest deadline, of an SDO transfer, is 60 s ahead."""
 BEGAN_S = 99.0
 """The clock begins at 100 s."""
 DIGITS = 3
-UNSEEN = frozenset((
-    # counters, and what is only shown to people
-    "_stats", "_told", "_mux_told", "_cycle", "_sequence", "sequence", "received", "refused", "frames_dropped",
-    "dropped", "serial", "stops", "trips", "counters", "lease_age_ms", "stamp_ns", "seen", "detail", "snapshot",
-    "_status_at", "_mux_state_at", "_state_at", "_counters_due", "_longest_gap_s", "_request", "answered", "_reset_at",
-    "_sdo_turn", "_stamp_ns", "changes", "lost_producers", "_measures", "report", "copies", "_copies",
-    "copied", "copied_at", "_signs",
-    # where the base is: no decision of these parts looks at it; that of the scanner sees nothing
-    "_feed", "travel", "travel_m", "_travel_m", "_anchor_m", "_counts", "_counts_before", "_poses", "encoder_offset",
-    "_seen_m", "_from_m", "_restarts",
-    # what never changes
-    "_robot", "robot", "_config", "config", "drive", "layout", "scale", "personality", "_geometry", "dictionary",
-    "_timeouts", "clock", "_member", "_topics", "_late", "_kept", "_life", "_random", "_routes", "_heeds", "_handlers",
-    "_values", "note",
-    # only encoders that come and go, or jump, look at it
-    "_time_s",
-    # a bound on when a heartbeat can be missed: of the times that are seen anyway
-    "_none_before",
-    # when an SDO was requested last: only how late an answer is depends on it, and none is late
-    "_requests",
-    # of the records on the disk what was written last counts
-    "file", "_owner", "_cycles", "reset",
-))  # fmt: skip
-"""Names of fields that no decision looks at."""
+IGNORED = {
+    "a count that is shown alone": (
+        "DriverCore._stats DriverCore.frames_dropped DriverCore.stops Axis._restarts Watchdog.trips "
+        "Watchdog._longest_gap_s Watchdog._counters_due _Source.received _Source.refused Command.refused "
+        "LeaseBook.refused Observer.dropped BusReport.dropped SdoClient.dropped WatchdogLink.counters "
+        "WatchdogState.lease_age_ms"
+    ),
+    "a text for people": "Verdict.detail Decision.detail Entry.detail Finding.detail Record.detail",
+    "what was published last": (
+        "VelocityProcess._told VelocityProcess._mux_told Watchdog._told DriverProcess._told Axis._told "
+        "DriverProcess.snapshot CanopenNode._measures CanopenNode.report NodeBoot.report"
+    ),
+    "when a state is published again that did not change": (
+        "DriverProcess._cycle DriverProcess._status_at VelocityProcess._mux_state_at VelocityProcess._state_at"
+    ),
+    "counts of frames that came twice: no bus of a small world duplicates one": "_Share.frames _Share.copies",
+    "the newest frame, to know its copy again: there is none, and it holds the place on the way": "Copies._data",
+    "numbered on, and compared with the one before alone": (
+        "VelocityProcess._sequence VelocityProcess._stamp_ns Lease.sequence Lease.stamp_ns WatchdogLink._request "
+        "WatchdogState.answered BaseReady._cycles"
+    ),
+    "a place on an endless way: the steps between two samples decide, and both are those of now": (
+        "DriverCore._feed Axis.travel Axis.encoder_offset Stillness._travel_m StoppingDistance._travel_m "
+        "Plausibility._counts Plausibility._counts_before PushWatch._counts PushWatch._counts_before "
+        "StandWatch._counts Push._seen_m"
+    ),
+    "a place that is at most one sample from the newest one, or the same at standstill": (
+        "Stillness._anchor_m StoppingDistance._from_m"
+    ),
+    "the motion between two scans: the scanner of a small world sees nothing": "ExpectedMotion._poses",
+    "the same object for ever, or told elsewhere: dictionaries, disks": (
+        "Process._member Process.clock DriverProcess._topics VelocityProcess._topics DriverProcess._random "
+        "VelocityProcess.note DriverCore._handlers Observer._routes CanopenNode._values HeartbeatConsumer._values "
+        "Axis.scale Axis.personality Axis.dictionary Axis.drive _Record.drive WatchdogDisk._owner StopDisk._owner "
+        "StopDisk.file WatchdogDisk.file"
+    ),
+    "of a process that hangs: `form` tells its channels and timers": "Process._late Process._kept Process._life",
+    "looked at by encoders that come and go, or jump: no event makes one": "Encoder._time_s",
+    "a bound on when a heartbeat can be missed: of the times that are told anyway": "HeartbeatConsumer._none_before",
+    "how late an answer is: none is late here": "SdoClient._requests GuardRequests._requests",
+}
+"""Why no decision looks at it → fields, as `Class.name`; a class stands for those that are derived from it."""
+UNSEEN = {field: reason for reason, fields in IGNORED.items() for field in fields.split()}
 VALUES_UNSEEN = frozenset((0x6064, 0x6864, 0x606C, 0x6041, 0x606B, 0x6077))
 """Objects of a drive that repeat the state of its motor: position, velocity, statusword, demand, torque."""
+COUNTERS_FRAME = 0x2FE
+"""docs/bus.md: shown alone."""
 _FIXED = (
     FunctionType,
     BuiltinFunctionType,
@@ -109,7 +132,8 @@ class Canon:
     def _number(self, number: float) -> object:
         age_s = self._now - number
         if number >= BEGAN_S and -EPOCH_S < age_s < EPOCH_S:
-            return ("age", round(age_s, DIGITS) if age_s < OLD_S else "old")
+            told_s = round(age_s, DIGITS)
+            return ("age", told_s if told_s < OLD_S else "old")
         return round(number, DIGITS) + 0.0 if math.isfinite(number) else str(number)
 
     def _object(self, thing: Any, kind: Any) -> object:
@@ -128,7 +152,15 @@ _SETS = frozenset((set, frozenset))
 def _seen(thing: Any, kind: Any) -> list[Any]:
     """The value of each field that counts, slots and all."""
     values = [getattr(thing, name) for name in _slots(kind) if hasattr(thing, name)]
-    return values + [value for name, value in getattr(thing, "__dict__", {}).items() if name not in UNSEEN]
+    unseen = _unseen(kind)
+    return values + [value for name, value in getattr(thing, "__dict__", {}).items() if name not in unseen]
+
+
+@cache
+def _unseen(kind: type) -> frozenset[str]:
+    """Names of its fields that do not count."""
+    of = {base.__name__ for base in kind.__mro__}
+    return frozenset(name for owner, _, name in (field.partition(".") for field in UNSEEN) if owner in of)
 
 
 @cache
@@ -137,7 +169,7 @@ def _slots(kind: type) -> tuple[str, ...]:
     for base in kind.__mro__:
         slots = vars(base).get("__slots__", ())
         names += (slots,) if isinstance(slots, str) else slots
-    return tuple(name for name in names if name not in UNSEEN)
+    return tuple(name for name in names if name not in _unseen(kind))
 
 
 @cache
@@ -152,6 +184,12 @@ def _is_fixed(kind: type) -> bool:
 
 def told(small: SmallWorld, properties: Properties) -> bytes:
     """All that decides, as bytes."""
+    plain: Any = told_form(small, properties)
+    return marshal.dumps(plain, PLAIN)
+
+
+def told_form(small: SmallWorld, properties: Properties) -> tuple[object, ...]:
+    """All that decides, as nested tuples of plain values."""
     now_s = small.world.clock.now_s
     more = {
         "ends": sorted((round(at_s - now_s, DIGITS), name) for at_s, name in small.ends),
@@ -161,8 +199,7 @@ def told(small: SmallWorld, properties: Properties) -> bytes:
         "resets": len(small.resets) - sum(outcome.done for outcome in small.resets),
         "properties": properties.memory,
     }
-    told: Any = form(small.world, more)
-    return marshal.dumps(told, PLAIN)
+    return form(small.world, more)
 
 
 def form(world: World, more: Mapping[str, object]) -> tuple[object, ...]:
@@ -183,8 +220,13 @@ def form(world: World, more: Mapping[str, object]) -> tuple[object, ...]:
 
 
 def _process(canon: Canon, process: Process) -> object:
-    kept = tuple((channel, len(things)) for channel, things in process._kept.items())
+    kept = tuple((channel, sum(map(_decides, things))) for channel, things in process._kept.items())
     return (process.alive, kept, canon.form(process) if process.alive else "")
+
+
+def _decides(kept: tuple[object, tuple[Any, ...]]) -> bool:
+    """Not the watchdog's counters, which a driver that hung reads as if it had received them in time."""
+    return kept[1][:1] != (COUNTERS_FRAME,)
 
 
 def _values(canon: Canon, values: Mapping[int, int]) -> object:

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from canbase_campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
 from canbase_campaign.wishes import Wishes
 from canbase_config.stopping import max_wheel_mps
-from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_velocity.twist import Twist
-from canbase_watchdog.ladder import RUNGS, Step
-from canbase_watchdog.watchdog import State as WatchdogState
 from small_worlds.world import SPEED_MPS, STEP_S, SmallWorld
 
 PROPERTIES = {
@@ -29,7 +26,8 @@ PROPERTIES = {
 }
 HEARD_S = 0.1
 """The button publishes at once that it is pressed."""
-OBEY_S = RUNGS[Step.QUICK_STOP].obey_s + 2.0 * STEP_S
+OBEY_S = 0.15 + 2.0 * STEP_S
+"""A drive has braked by a quick stop after this: the first rung of docs/bus.md, and two steps."""
 RUNAWAY_MPS, RUNAWAY_S = 0.3, 0.5
 
 
@@ -71,7 +69,7 @@ class Properties:
         self._latches: set[str] = set()
         self._latched: _Hold | None = None
         self._neutral: _Hold | None = None
-        self._was_enabled = small.world.driver.core.state is DriverState.ENABLED
+        self._was_enabled = small.world.driver.enabled
         self._lives = self._cores()
         self._with_power = {part.name: False for part in small.parts}
         """Whether there was power when the part was seen alive last."""
@@ -150,8 +148,8 @@ class Properties:
         if not (self._small.around.pressed and velocity.running):
             self._pressed_at = now_s
         seen = {
-            "driver": driver.alive and self._world.driver.core.state is DriverState.LATCHED,
-            "watchdog": watchdog.alive and self._world.watchdog.core.status.state is WatchdogState.TRIPPED,
+            "driver": driver.alive and self._world.driver.latched,
+            "watchdog": watchdog.alive and self._world.watchdog.tripped,
             "emergency stop": now_s > self._pressed_at + HEARD_S,
         }
         return {name for name, is_latched in seen.items() if is_latched}
@@ -159,7 +157,7 @@ class Properties:
     def _note_starts(self, now_s: float) -> None:
         """Enabled, or a filter that is new: an operator who holds the joystick then has to show zero first."""
         world = self._world
-        is_enabled = world.driver.alive and world.driver.core.state is DriverState.ENABLED
+        is_enabled = world.driver.alive and world.driver.enabled
         starts = is_enabled and not self._was_enabled
         self._was_enabled = is_enabled
         if (starts or "velocity" in self._born) and self._small.held:
@@ -176,7 +174,7 @@ class Properties:
 
     def _check_power(self, now_s: float) -> None:
         world = self._world
-        if world.watchdog.running and world.watchdog.core.status.state is WatchdogState.WATCHING:
+        if world.watchdog.running and world.watchdog.watching:
             self._watching_at = now_s
         grace_s = world.robot.timeouts.watchdog_s + notice_s(world.robot) + 2.0 * STEP_S
         for change in world.drives.changes():

@@ -12,6 +12,7 @@ from small_worlds import canonical
 from small_worlds.copying import Snapshot
 from small_worlds.events import EVENTS, FAULT_EVENTS, OPERATOR_EVENTS
 from small_worlds.explore import Bounds, Search, Story, search, shortest
+from small_worlds.merged import differences, pairs
 from small_worlds.properties import PROPERTIES, Found, Properties, _Hold
 from small_worlds.teeth import TEETH, Tooth, bite
 from small_worlds.world import POINT_S, STARTS, STEP_S, SmallWorld
@@ -119,6 +120,35 @@ def test_a_copy_has_the_error_that_a_boot_was_answered_with() -> None:
     copied = Snapshot(error).restore()
     assert copied is not error
     assert (type(copied), str(copied), vars(copied)) == (SdoAborted, str(error), vars(error))
+
+
+PAIRS, FUTURES = 5, 2
+
+
+def merged_differently(seed: int) -> list[list[str]]:
+    """Of PAIRS pairs of worlds that count as the same, with FUTURES for each."""
+    merged = list(pairs(seed, PAIRS))
+    assert len(merged) == PAIRS
+    futures = [(pair, seed * 100 + number) for pair in merged for number in range(FUTURES)]
+    return [apart for pair, future in futures if (apart := differences(pair, future))]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_worlds_that_count_as_the_same_continue_alike(seed: int) -> None:
+    assert merged_differently(seed) == []
+
+
+def test_a_field_that_decides_and_is_ignored_makes_such_worlds_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether a source is armed: two worlds count as the same then, and only one of them follows its joystick."""
+    monkeypatch.setitem(canonical.UNSEEN, "Arming.waits_since", "a tooth")
+    for cached in (canonical._unseen, canonical._slots):
+        cached.cache_clear()
+    try:
+        assert any(merged_differently(seed) for seed in range(4))
+    finally:
+        monkeypatch.undo()
+        for cached in (canonical._unseen, canonical._slots):
+            cached.cache_clear()
 
 
 @pytest.mark.parametrize("start", STARTS)

@@ -38,6 +38,8 @@ TORN_AT = 100
 """A byte of the first of two pages."""
 ENABLE_S = 0.9
 """In place of state_machine.ENABLE_TIMEOUT_S, which is longer than canonical.OLD_S."""
+NEUTRAL_S = 1.0
+"""In place of 2 s, for the same reason: whether a source is armed by absence must not depend on an age that is old."""
 STICK_S = 0.1
 """Between two messages of the joystick."""
 SPEED_MPS = 0.4
@@ -52,7 +54,12 @@ def small_robot() -> Robot:
         update={"control_hz": 1.0 / STEP_S, "command_hz": 1.0 / STEP_S, "odometry_hz": 1.0, "status_hz": 25.0}
     )
     timeouts = robot.timeouts.model_copy(update={"feedback_s": 0.2})
-    return robot.model_copy(update={"rates": rates, "timeouts": timeouts, "watchdog": watchdog})
+    sources = {
+        name: source if source.neutral_after_s is None else source.model_copy(update={"neutral_after_s": NEUTRAL_S})
+        for name, source in robot.mux.sources.items()
+    }
+    mux = robot.mux.model_copy(update={"sources": sources})
+    return robot.model_copy(update={"rates": rates, "timeouts": timeouts, "watchdog": watchdog, "mux": mux})
 
 
 def _nobody(outcome: object) -> None:
