@@ -14,6 +14,10 @@ from functools import lru_cache, partial
 import pytest
 
 from campaign.removed_safeguards import SAFEGUARDS, remove
+from canbase_action_server import causes
+from canbase_action_server.outcome import ErrorCode
+from canbase_campaign import velocity_process
+from canbase_campaign.action_process import Goal
 from canbase_campaign.fault import PlannedFault
 from canbase_campaign.plan import GoalRequest, Plan, Segment
 from canbase_campaign.robots import draw_robot
@@ -24,6 +28,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia402.states import State as Drive
+from canbase_velocity.lease import lease_datagram
 from canbase_velocity.twist import Twist
 from canbase_watchdog.trip_cause import FINE
 from canbase_watchdog.watchdog import State, Watchdog
@@ -135,6 +140,38 @@ def forgets_the_second(world: World) -> None:
     Watchdog.tick = forgetful  # type: ignore[assignment, method-assign]
 
 
+def goals_are_not_taken_over(world: World) -> None:
+    """drive_distance_server does not look who has the base."""
+    causes.ALL = tuple(row for row in causes.ALL if row[1].code is not ErrorCode.TAKEN_OVER)
+
+
+def goals_drive_on(world: World) -> None:
+    """It orders motion again 1 s after the end of a goal."""
+    action = world.action
+
+    def on_end(goal: Goal) -> None:
+        world.clock.after(1.0, orders)
+
+    def orders() -> None:
+        twist = Twist(0.3, 0.0)
+        action.on_order(twist)
+        world.topics.publish("cmd_vel_action", twist)
+
+    ends = action._on_end
+    action._on_end = lambda goal: (ends(goal), on_end(goal))  # type: ignore[assignment, func-returns-value]
+
+
+def brakes_softly(world: World) -> None:
+    """The filter's leases never say that the base has to brake hard."""
+    velocity_process.lease_datagram = partial(_soft, lease_datagram)  # type: ignore[attr-defined]
+
+
+def _soft(
+    real: Callable[..., bytes], sequence: int, stamp_ns: int, twist: Twist, *, brakes_hard: bool = False
+) -> bytes:
+    return real(sequence, stamp_ns, twist, brakes_hard=False)
+
+
 STOPPED = fault("stop_requested", 0.6, 0.5)
 SHORT, LONG = (stick(0.4, 0.0, 0.0, 0.5),), (stick(0.6, 0.0, 0.0, 9.0),)
 UNWATCHED = "watchdog:all+drives:heartbeat_consumer"
@@ -145,7 +182,8 @@ SYNC = fault("second_master_sync", 0.75, 0.02, on=True)
 HELD = fault("stick_held", 1.5, 3.0, twist=Twist(0.3, 0.0))
 RESET = plan(STOPPED, HELD, segments=(stick(0.3, 0.0, 0.0, 0.5),))
 TURNED = (stick(0.0, 1.2, 0.4, 0.6), stick(0.6, 0.0, 1.2, 4.0))
-GOAL = GoalRequest(0.1, 0.5, 0.3, None)
+GOAL, LONG_GOAL = GoalRequest(0.1, 0.5, 0.3, None), GoalRequest(0.1, 1.5, 0.3, None)
+PRESSED = fault("estop_pressed", 2.0, 2.0)
 TWICE = plan(
     *(fault("lease_lost", start_s, 0.5, value=1.0) for start_s in (0.8, 4.6)),
     segments=(stick(0.4, 0.0, 0.0, 1.4), stick(0.0, 0.0, 1.5, 2.5), stick(0.4, 0.0, 4.0, 3.0)),
@@ -201,6 +239,12 @@ STORIES = (
           plan(fault("encoder_reversed", 0.8, 4.0, wheel=2), replace(CUT, start_s=0.85),
                segments=(stick(0.4, 0.0, 0.0, 9.0),)),
           "heartbeat", no_masters, "drives:heartbeat_consumer", TWO_MOTORS_A_SIDE),
+    Story("a goal, and a joystick at zero that takes the base and lets go",
+          replace(plan(segments=(stick(0.0, 0.0, 0.8, 0.6),)), goals=(LONG_GOAL,)), "over", goals_are_not_taken_over),
+    Story("a goal that has ended", replace(plan(), goals=(GOAL,)), "over", goals_drive_on),
+    Story("an emergency stop that brakes as an ordinary one",
+          plan(PRESSED, segments=(stick(0.8, 0.0, 0.0, 9.0),)), "short", brakes_softly),
+    Story("the same in a curve", plan(PRESSED, segments=(stick(0.8, 0.5, 0.0, 9.0),)), "short", brakes_softly),
     Story("a loaded base that swings back after its drives' own stop, and drives without masters",
           plan(replace(CUT, start_s=2.0), segments=(stick(1.1, 0.0, 0.0, 9.0),)), "heartbeat", no_masters,
           "drives:heartbeat_consumer", LOADED),

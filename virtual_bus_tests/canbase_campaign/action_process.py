@@ -46,6 +46,8 @@ class ActionProcess(Process):
         super().__init__(clock)
         self._robot, self._topics, self._on_end = robot, topics, on_end
         self._own_source = action_source(robot)
+        self.on_order: Callable[[Twist], None] = lambda twist: None
+        """Takes each command that it publishes."""
         self.goals: list[Goal] = []
         self.refused = 0
         topics.subscribe("odom", self, self._on_odometry)
@@ -100,7 +102,9 @@ class ActionProcess(Process):
         self._turned_at = now_s
         cycle = self.goal_queue.tick(self._inputs, now_s)
         if cycle.twist is not None:
-            self._topics.publish("cmd_vel_action", Twist(cycle.twist.linear_mps, cycle.twist.angular_radps))
+            twist = Twist(cycle.twist.linear_mps, cycle.twist.angular_radps)
+            self.on_order(twist)
+            self._topics.publish("cmd_vel_action", twist)
         for end in cycle.ends:
             goal = self.goals[int(end.key)]
             goal.ends.append(end.outcome)

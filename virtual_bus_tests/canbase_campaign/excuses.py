@@ -18,7 +18,7 @@ STEP_S = 0.01
 """The judge looks so often."""
 MOST_SHARE, MOST_STOP_SHARE = 0.05, 0.01
 """Of the time in motion a property is excused for less than this; one that is about the stop for less than that."""
-STOPS = ("envelope", "sources", "held", "estop", "latched")
+STOPS = ("envelope", "sources", "held", "estop", "latched", "short")
 """Properties that are about the stop."""
 
 
@@ -45,6 +45,12 @@ EXCUSES = {
         "two faults overlap, or have just done so: the layer that would notice the first is the one that is disturbed, "
         "and the next one has its own time",
         5.0,
+    ),
+    "one fault": Excuse(
+        "the layer that would brake hard first is the one that is disturbed: the next one acts within its own time", 5.0
+    ),
+    "late states": Excuse(
+        "the network holds a state back without a trace: who has the base is known so much later", 5.0
     ),
     "late frames": Excuse("the bus holds each frame back: the command and its answer come so much later", 5.0),
     "second master": Excuse(
@@ -119,12 +125,20 @@ class Faults:
             for fault in plan.faults
             if fault.name not in HARMLESS
         ]  # fmt: skip
-        self._overlap_at = -math.inf
+        self._overlap_at = self._one_at = -math.inf
+
+    def step(self, now_s: float) -> None:
+        """To be called every step."""
+        holding = sum(begin_s <= now_s < end_s for begin_s, end_s in self._spans)
+        self._one_at = now_s if holding else self._one_at
+        self._overlap_at = now_s if holding > 1 else self._overlap_at
+
+    def one(self, now_s: float) -> bool:
+        """One holds, or did so less than one reaction ago."""
+        return now_s <= self._one_at + self._react_s
 
     def overlap(self, now_s: float) -> bool:
-        """Two hold, or did so less than one reaction ago. To be called every step."""
-        if sum(begin_s <= now_s < end_s for begin_s, end_s in self._spans) > 1:
-            self._overlap_at = now_s
+        """Two hold, or did so less than one reaction ago."""
         return now_s <= self._overlap_at + self._react_s
 
     def on_reset(self, now_s: float) -> None:
@@ -147,6 +161,16 @@ class Ledger:
         """The next look; `moves`: the base does."""
         self._now_s, self._moves = now_s, moves
         self.moving_s += STEP_S * moves
+
+    @property
+    def moves(self) -> bool:
+        """The base does, now."""
+        return self._moves
+
+    def add(self, name: str, row: str, seconds: float) -> None:
+        """A row was needed for the last `seconds` in motion, as is known only now."""
+        if seconds > 0.0:
+            self.excused_s[name, row] = self.excused_s.get((name, row), 0.0) + seconds
 
     def excuse(self, name: str, row: str) -> bool:
         """The property `name` holds by this row alone. False: for longer than the row allows."""

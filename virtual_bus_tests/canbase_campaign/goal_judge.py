@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 
 from canbase_campaign.action_process import Goal
+from canbase_campaign.allowance import is_late
 from canbase_campaign.excuses import Ledger
 from canbase_campaign.odometry_judge import FLOOR_M, SHARE, Place, true_place
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
-from canbase_config.stopping import max_wheel_mps, standstill_s
+from canbase_config.state_age import STATE_PERIOD_S, state_timeout_s
+from canbase_config.stopping import lag_s, max_wheel_mps, standstill_s
+from canbase_velocity.twist import Twist
 
 STEP_S = 0.01
+OWN_TOPIC = "cmd_vel_action"
 TOLERANCES = 3.0
 """This many times action.tolerance_m: wheels roll a little until they stand."""
 
@@ -23,9 +27,46 @@ class GoalJudge:
         self._world, self._shown, self._ledger = world, shown, ledger
         self._from: dict[int, Place] = {}
         """Where the base truly was when a goal began; a goal during which an encoder lies is not compared."""
+        sources = world.robot.mux.sources.values()
+        own = max((source.priority for source in sources if source.topic == OWN_TOPIC), default=0)
+        self._higher = {source.topic for source in sources if source.priority > own}
+        self._taken: dict[int, float] = {}
+        """When a source of higher priority, or a lock, took the base from a goal that ran."""
 
-    def step(self) -> None:
-        """Now."""
+    def arrived(self, topic: str, twist: Twist) -> None:
+        """A command has arrived at the mux: a source of higher priority has the base, at zero too."""
+        if topic in self._higher and twist.is_finite and self._world.velocity.running:
+            self._take()
+
+    def _take(self) -> None:
+        for goal in self._world.action.goals[-1:]:
+            if not goal.ends and not goal.died:
+                self._taken.setdefault(goal.number, self._world.clock.now_s)
+
+    def ordered(self, twist: Twist) -> str:
+        """What is wrong with this command of the action server; empty: nothing."""
+        if twist.is_zero:
+            return ""
+        goal = self._world.action.goals[-1] if self._world.action.goals else None
+        if goal is None or goal.ends or goal.died:
+            return f"{twist} is ordered, and no goal runs"
+        since_s = self._world.clock.now_s - self._taken.get(goal.number, math.inf)
+        over_s = since_s - self._ends_s(goal)
+        late_s = self._world.topics.delay_s.get("velocity_mux/state", 0.0)
+        if is_late("over", self._ledger, over_s, [("late states", late_s)]):
+            return f"{twist} is ordered for goal {goal.number}, {since_s:.2f} s after it lost the base"
+        return ""
+
+    def _ends_s(self, goal: Goal) -> float:
+        """A state arrives with the next publication, or is missed; then the goal brakes to standstill."""
+        robot, limits = self._world.robot, self._world.robot.limits
+        brakes_s = goal.speed_mps / limits.deceleration_mps2 + limits.deceleration_mps2 / limits.jerk_mps3
+        return STATE_PERIOD_S + state_timeout_s() + lag_s(robot) + brakes_s + goal.held_up_s
+
+    def step(self, locked: bool) -> None:
+        """Now. `locked`: a lock of the mux holds that it can know of."""
+        if locked:
+            self._take()
         for goal in self._world.action.goals[len(self._from) :]:
             self._from[goal.number] = true_place(self._world)
         if not self._shown.tells_truth:

@@ -27,6 +27,7 @@ from canbase_campaign.odometry_judge import OdometryJudge
 from canbase_campaign.outside import Outside, Surroundings
 from canbase_campaign.plan import Plan
 from canbase_campaign.reach import BRAKES_S, Reach
+from canbase_campaign.short_judge import ShortJudge
 from canbase_campaign.shown import Shown
 from canbase_campaign.strangers import SENT_S, Strangers
 from canbase_campaign.wishes import Wishes
@@ -111,11 +112,13 @@ class Judge:
         self._odometry = OdometryJudge(world, self._shown, self.ledger)
         self._goals = GoalJudge(world, self._shown, self.ledger)
         self._motion = MotionJudge(world, self._shown, self.ledger)
+        self._short = ShortJudge(world, self._shown, self.ledger)
         self.trips: list[str] = []
         self.lives, self._fresh = 1, False
         """How often the base drove, with a reset between; whether one was done, and it has not moved since."""
         world.on_lease = self._on_lease
         world.on_goal_end = self._on_goal_end
+        world.action.on_order = self._on_goal_order
         world.topics.watch = self._on_message
         world.topics.arrivals |= {source.topic: self._on_arrival for source in world.robot.mux.sources.values()}
         self._step()
@@ -142,6 +145,7 @@ class Judge:
     def _look_at_faults(self, tau_s: float, now_s: float) -> None:
         """What is active at this moment."""
         active, robot = self._active, self._world.robot
+        self._faults.step(now_s)
         active.coasting = tau_s > 0.0 and self._coasts()
         active.lost = self._reach.lost
         active.second_fault_s = notice_s(robot) * self._faults.overlap(now_s)
@@ -157,13 +161,17 @@ class Judge:
     def _on_lease(self, twist: Twist) -> None:
         if self._awaits_zero and not twist.is_zero:
             self._violate("zero", f"{twist} is ordered, and the command was not zero since the emergency stop")
-        locked_s = self._world.clock.now_s - max(self._world.locked_at, self._lock_from)
+        locked_s = self._locked_s(self._world.clock.now_s)
         if locked_s > HEARD_S and not twist.is_zero:
             self._violate("locked", f"{twist} is ordered, {locked_s:.2f} s after a lock was closed")
         self._leased, self._leased_at = twist, self._world.clock.now_s
         tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
         self._envelope.order(tau_s, self._world.clock.now_s)
         self._motion.order(twist)
+
+    def _locked_s(self, now_s: float) -> float:
+        """So long a lock holds that the mux can know of."""
+        return now_s - max(self._world.locked_at, self._lock_from)
 
     def _on_message(self, topic: str, message: object) -> None:
         """What the sources want; and a command of zero after an emergency stop, before anything else is ordered."""
@@ -180,6 +188,12 @@ class Judge:
 
     def _on_arrival(self, topic: str, message: Twist) -> None:
         self._wishes.arrive(topic, message, self._world.clock.now_s)
+        self._goals.arrived(topic, message)
+
+    def _on_goal_order(self, twist: Twist) -> None:
+        problem = self._goals.ordered(twist)
+        if problem:
+            self._violate("over", problem)
 
     def _step(self) -> None:
         now_s = self._world.clock.now_s
@@ -194,12 +208,13 @@ class Judge:
         self._check_neutral(tau_s, now_s)
         self._check_drives(now_s)
         self._check_stop_button(tau_s, now_s)
+        self._check_short(now_s)
         if not self._world.velocity.running:
             self._lock_from = now_s + FOUND_S
         self._check_wall(tau_s, now_s)
         if self._fresh and tau_s > 0.0 and not self._latches:
             self.lives, self._fresh = self.lives + 1, False
-        self._goals.step()
+        self._goals.step(locked=self._locked_s(now_s) > HEARD_S)
         self._odometry.step(now_s)
         name, detail = self._motion.step(now_s, self._reach.lost)
         if name:
@@ -434,6 +449,22 @@ class Judge:
         over_s = now_s - self._pressed_at - self._around.button_s - self._one_s - longest_s
         if tau_s > 0.0 and is_late("estop", self.ledger, over_s, gives.items()):
             self._violate("estop", f"{self._shown}, {now_s - self._pressed_at:.2f} s after it was pressed")
+
+    def _check_short(self, now_s: float) -> None:
+        """From the moment on in which a filter that runs has received the button."""
+        topics, topic = self._world.topics, self._world.robot.safety.estop.topic
+        disturbed = topic in topics.loss or topic in topics.delay_s or topic in topics.beside
+        if self._around.pressed and self._world.velocity.running and not disturbed:
+            self._short.begin(now_s)
+        gives = dict(self._active.gives_s())
+        gives["one fault"] = self._one_s * self._faults.one(now_s)
+        gives["unreachable"] = math.inf if self._reach.lost else 0.0
+        gives["rolls out"] = math.inf if self._active.coasting else 0.0
+        gives["strange hands"] = self._one_s * (now_s <= self._strangers.acted_at + self.react_s)
+        gives["lying sensor"] = math.inf if self._motion.ran_away or not self._shown.tells_truth else 0.0
+        problem = self._short.step(now_s, gives)
+        if problem:
+            self._violate("short", problem)
 
     def _on_goal_end(self, goal: Goal) -> None:
         outcome = goal.ends[-1]

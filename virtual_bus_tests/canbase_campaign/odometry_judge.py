@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from canbase_campaign.excuses import Ledger
+from canbase_campaign.excuses import STEP_S, Ledger
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
 from canbase_config.stopping import max_wheel_mps
@@ -22,6 +22,10 @@ BRAKES_MPS = 0.2
 """So much faster, or by what the drives brake since then, the base may have been when the newest sample was taken."""
 BOOTS_S = 1.0
 """A driver that has a line again begins to boot the drive within this time [s]."""
+HEADS_RAD = 0.02
+"""... and so far beside the true heading."""
+SHOWS_S = 2.0
+"""What is lost in a gap shows as soon as the base is slow enough for the comparison to be sharp [s]."""
 FLOOR_M, SHARE = 0.01, 0.03
 """What encoder steps, inner steps of the plant and cycles of different length may differ by."""
 
@@ -71,7 +75,13 @@ class OdometryJudge:
         self._last: tuple[float, Place] | None = None
         self._origins: tuple[Place, Place] | None = None
         self._path_from_m = self._rim_from_mps = 0.0
-        self._excused = False
+        self._excused = ""
+        """The row by which a pose beside the true one is excused now; empty: none."""
+        self._beside = False
+        """The newest pose needs that row."""
+        self._gap_until, self._gap_unread_s = -math.inf, 0.0
+        self._unread_s = 0.0
+        """The base moved for so long while the driver had no line from a drive, since the last pose."""
 
     def step(self, now_s: float) -> None:
         """What an encoder cannot know, also while the driver hangs: it reads the counts of that time later."""
@@ -82,11 +92,11 @@ class OdometryJudge:
             self._counters, self._restarts_until = counters, now_s + self._late_s
         self._look_at_lines(now_s)
         rows = {"encoder lies": self._lies_until, "counter restarted": self._restarts_until}
-        self._excused = False
-        for row, until in rows.items():
-            if now_s <= until:
-                self._origins, self._excused = None, True
-                self._ledger.excuse("odometry", row)
+        before, self._excused = self._excused, next((row for row, until in rows.items() if now_s <= until), "")
+        if before and not self._excused:
+            self._origins, self._beside = None, False  # what it missed by then is missing for ever
+        elif self._excused and self._beside:
+            self._ledger.excuse("odometry", self._excused)
 
     def _look_at_lines(self, now_s: float) -> None:
         world, blocked = self._world, self._world.bus.disturbance.blocked
@@ -97,7 +107,7 @@ class OdometryJudge:
                 self._read_at[node_id] = now_s
         if now_s > min(self._read_at.values()) + self._late_s:
             self._missed_at = now_s
-            self._ledger.excuse("odometry", "unread")
+            self._unread_s += STEP_S * self._ledger.moves
 
     def _counters_now(self) -> list[int]:
         return [axis.encoder_offset for axis in self._axes]
@@ -108,11 +118,19 @@ class OdometryJudge:
         if driver.core is not self._core:
             self._core, self._last, self._origins = driver.core, None, None
         last_at = self._last[0] if self._last is not None else math.inf
-        if last_at + self._gap_s < now_s and last_at <= self._missed_at + BOOTS_S:
-            self._origins = None  # it did not publish meanwhile, so nobody follows across that
         pose = snapshot.odometry.pose
         place = Place(pose.x_m, pose.y_m, pose.yaw_rad)
-        return self._jump(place, now_s) or ("" if self._excused else self._difference(place))
+        problem = self._difference(place)
+        if last_at + self._gap_s < now_s and last_at <= self._missed_at + BOOTS_S:
+            self._gap_until, self._gap_unread_s = now_s + SHOWS_S, self._unread_s
+        if now_s <= self._gap_until and (
+            problem or self._heads_elsewhere(place)
+        ):  # it published nothing meanwhile: nobody follows across that
+            self._ledger.add("odometry", "unread", self._gap_unread_s)
+            self._gap_until, problem = -math.inf, self._restart(place)
+        self._unread_s = 0.0
+        self._beside = bool(problem)
+        return self._jump(place, now_s) or ("" if self._excused else problem)
 
     def _jump(self, place: Place, now_s: float) -> str:
         last, self._last = self._last, (now_s, place)
@@ -126,11 +144,24 @@ class OdometryJudge:
         base, truth = self._world.drives.bench.base, true_place(self._world)
         rim_mps = max(abs(base.v_left_mps), abs(base.v_right_mps))
         if self._origins is None:
-            self._origins, self._path_from_m = (place, truth), base.path_m
-            self._rim_from_mps = rim_mps + max(BRAKES_MPS, self._braked_mps) if rim_mps > 0.0 else 0.0
-            return ""
+            return self._restart(place)
         seen, true = place.seen_from(self._origins[0]), truth.seen_from(self._origins[1])
         off_m = math.hypot(seen[0] - true[0], seen[1] - true[1])
         rims_mps = rim_mps + max(BRAKES_MPS, self._braked_mps) + self._rim_from_mps
         possible_m = FLOOR_M + SHARE * (base.path_m - self._path_from_m) + self._late_s * rims_mps
         return f"pose is {off_m:.3f} m beside the true one" if off_m > possible_m else ""
+
+    def _heads_elsewhere(self, place: Place) -> bool:
+        """A turn was missed: it shows in the distance later."""
+        if self._origins is None:
+            return False
+        turned_rad = true_place(self._world).yaw_rad - self._origins[1].yaw_rad
+        return abs(math.remainder(place.yaw_rad - self._origins[0].yaw_rad - turned_rad, math.tau)) > HEADS_RAD
+
+    def _restart(self, place: Place) -> str:
+        """The comparison begins anew with this pose, which nothing is wrong with."""
+        base = self._world.drives.bench.base
+        rim_mps = max(abs(base.v_left_mps), abs(base.v_right_mps))
+        self._origins, self._path_from_m = (place, true_place(self._world)), base.path_m
+        self._rim_from_mps = rim_mps + max(BRAKES_MPS, self._braked_mps) if rim_mps > 0.0 else 0.0
+        return ""

@@ -20,6 +20,8 @@ PROPERTIES = {
     "odometry": "the driver's pose never jumps, and is the true one as long as the encoders tell the truth",
     "locked": "nothing is ordered while somebody publishes that a lock holds",
     "goal": "every goal ends exactly once, in its time; one that succeeded is where it should be",
+    "over": "a goal that has ended, or from which a source or a lock took the base, orders no motion later by itself",
+    "short": "an emergency stop takes v²/(2·a_emergency) after the reaction, nothing longer",
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
     "path": "the base turns as it was ordered to, or not at all, but for the stated time",
     "standstill": "what the driver reports as standstill is one",
