@@ -1,5 +1,6 @@
-"""Keys of robot.yaml that depend on each other, as one table: how long a timeout has to be for what it waits for, and
-how fine an encoder for the tolerance that it is compared with.
+"""Keys of robot.yaml that depend on each other, as one table.
+
+How long a timeout has to be for what it waits for, and how fine an encoder for the tolerance that it is compared with.
 
 `canbase config check` refuses a file by it, docs/configuration.md shows it, and the campaign draws robots at its edges.
 Pure. A timeout allows for one lost message: two periods, plus the time by which a message may be late.
