@@ -9,10 +9,13 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from canbase_config.commissioned import mark
+from canbase_config.load import load_robot
 from vm import independent_stacks
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+EXAMPLE = ROOT / "can_config/canbase_config/robots/example_can0.yaml"
 SLOW = "rates: {control_hz: 50.0, odometry_hz: 25.0, command_hz: 25.0}\naction: {control_hz: 20.0}\n"
 """The guest's processor is: a billion instructions a second, and no other one. All timeouts are those of a robot."""
 HARDWARE_WATCHDOG_S = 5
@@ -22,12 +25,13 @@ ALIGNED = 4
 
 def robot_yaml(channel: str, lease: str) -> str:
     """The example robot on an interface of the guest, without scanner and button, which it does not have, and without
-    a proof of its drives, which nobody commissions here."""
-    text = (ROOT / "can_config/canbase_config/robots/example_can0.yaml").read_text(encoding="utf-8")
+    a proof of its drives, which nobody commissions here. That its units fit is marked, or it would be slower than
+    the scenarios: they are those of the simulation."""
+    text = EXAMPLE.read_text(encoding="utf-8")
     text = text.replace("required: true", "required: false").replace("name: example", "name: robot")
     text = text.replace("require_self_stop: true", "require_self_stop: false")
     text = text.replace("channel: can0", f"channel: {channel}").replace("/run/canbase/lease.sock", lease)
-    return text + SLOW
+    return f"{text}{SLOW}commissioned: {{scale: {mark(load_robot(EXAMPLE).robot, 'scale')}}}\n"
 
 
 def overlay(folder: Path) -> None:

@@ -15,6 +15,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final
 
+from canbase_config.commissioned import mark
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot as Config
 from canbase_sim.cia402.raw_units import Scale
@@ -48,6 +49,8 @@ def drives_of_ros2_canopen(robot: Robot) -> Row:
     """They boot, are enabled and driven at speed. The driver is killed: the watchdog's quick stop stops both."""
     CONFIG.write_text(_config(ROBOT_YAML.read_text()))
     config = load_robot(CONFIG).robot
+    with CONFIG.open("a") as file:
+        print(f"commissioned: {{scale: {mark(config, 'scale')}}}", file=file)
     with virtual_interface(BUS), _candump(), _slaves(config):
         robot.spin(2.0)  # they send their boot-up after a second
         with _installed():
@@ -82,7 +85,8 @@ def _say(what: str) -> None:
 
 
 def _config(text: str) -> str:
-    """The guest's robot with these drives: 60FFh in counts/s."""
+    """The guest's robot with these drives: 60FFh in counts/s, which no step has shown yet."""
+    text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("commissioned:"))
     text = text.replace("name: robot", f"name: {NAME}").replace("channel: can0", f"channel: {BUS}")
     text = text.replace("velocity_unit: rpm", "velocity_unit: counts/s")
     text = text.replace("    direction: -1", "    direction: -1\n    velocity_unit: counts/s")
