@@ -65,6 +65,7 @@ class Site:
     def __init__(self, robot: RunningRobot, launched: Any, folder: Path) -> None:
         self.robot, self._browser = robot, launched
         (folder / "token").write_text(TOKEN, encoding="utf-8")
+        (folder / "token").chmod(0o600)
         self._url = f"http://127.0.0.1:{free_tcp_port()}"
         port = self._url.rpartition(":")[2]
         words = ("web", "--config", str(robot.config), "--port", port, "--token-file", str(folder / "token"))

@@ -29,6 +29,7 @@ def page_of_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[st
     folder = tmp_path_factory.mktemp("commission")
     config = write_robot(folder, free_udp_port())
     (folder / "token").write_text(TOKEN, encoding="utf-8")
+    (folder / "token").chmod(0o600)
     port = free_tcp_port()
     words = ("web", "--config", str(config), "--port", str(port), "--token-file", str(folder / "token"))
     environment = ENVIRONMENT | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "99"}

@@ -52,6 +52,7 @@ class Site:
         self.robot, self.browser = robot, launched
         token = folder / "token"
         token.write_text(f"{TOKEN}\n", encoding="utf-8")
+        token.chmod(0o600)
         self.port = free_tcp_port()
         self.url = f"http://127.0.0.1:{self.port}"
         words = ("web", "--config", str(robot.config), "--port", str(self.port), "--token-file", str(token))
