@@ -5,6 +5,7 @@ Rule. What is missing counts as the worst that it could report: the goal ends, t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -33,9 +34,9 @@ class StateTopic:
         received, timeout_s = self.received(inputs), self.timeout_s(robot)
         if received.within(timeout_s, now_s) is not None:
             return None
-        if received.never:
-            return f"nothing received on {self.topic} yet; is {self.node} running?"
         age_s = received.age_s(now_s)
+        if age_s == math.inf:
+            return f"nothing received on {self.topic} yet; is {self.node} running?"
         return f"no message on {self.topic} for {age_s:.2f} s (timeout {timeout_s:.4g} s); is {self.node} running?"
 
 

@@ -101,7 +101,7 @@ def _driver_forgets() -> None:
 
 def _forget_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
     """Released, the emergency stop is free at once."""
-    self._estop.state = HELD if self._pressed(now_s) else FREE
+    self._estop.state = HELD if self._pressed else FREE
 
 
 def _no_estop(self: filter_state.SafetyFilter, now_s: float) -> None:

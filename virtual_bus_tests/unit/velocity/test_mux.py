@@ -39,7 +39,7 @@ def test_before_any_command_zero_is_ordered_and_each_source_says_why(mux: Mux) -
     assert decision.active is None
     assert decision.twist == ZERO
     assert reasons(decision) == dict.fromkeys(("joystick", "navigation", "action"), "never received")
-    assert [source.age_s for source in decision.sources] == [math.inf] * 3
+    assert [source.age_s for source in decision.sources] == [None, None, None]
 
 
 def test_sources_are_listed_by_falling_priority_whatever_their_order_in_the_file() -> None:
