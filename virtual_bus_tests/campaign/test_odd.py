@@ -27,6 +27,7 @@ NEEDS_A_CURE = {
     "soft_stop",
     "guarding_alone",
     "one_tpdo",
+    "other_unit",
 }
 UNUSABLE = {"synchronous_alone", "wide_status"}
 TOGETHER = range(8)

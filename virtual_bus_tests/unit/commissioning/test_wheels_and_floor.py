@@ -77,8 +77,6 @@ def test_the_direction_comes_out_right_whatever_robot_yaml_said(says: int, there
     [
         ({}, {}, None),
         ({}, {"gear_ratio": 20.0}, "gear_ratio"),
-        ({"counts_per_motor_rev": 2048}, {}, "counts_per_motor_rev"),
-        ({"counts_per_motor_rev": 8192}, {}, "counts_per_motor_rev"),
         ({"velocity_unit": "rpm"}, {"velocity_unit": "0.1rpm"}, "velocity_unit"),
     ],
 )
@@ -91,6 +89,14 @@ def test_the_wrong_key_is_found_and_corrected(says: dict[str, Any], there: dict[
     assert corrected.gear_ratio == pytest.approx(wanted.gear_ratio, rel=0.02)
     assert corrected.counts_per_motor_rev == pytest.approx(wanted.counts_per_motor_rev, rel=0.02)
     assert corrected.velocity_unit == wanted.velocity_unit
+
+
+@pytest.mark.parametrize("counts", [2048, 8192])
+def test_an_encoder_resolution_that_the_drive_contradicts_is_named_before_a_wheel_turns(counts: int) -> None:
+    world = Witness(with_left(counts_per_motor_rev=counts), with_left())
+    with pytest.raises(CommissionError, match=rf"608Fh:1 = 4096 .* robot\.yaml has counts_per_motor_rev: {counts}"):
+        world.guide(scale_of_left)
+    assert world.bench.base.travel_left_m == 0.0
 
 
 def test_a_wheel_that_runs_ten_times_as_fast_as_ordered_is_stopped_before_anybody_is_asked() -> None:
