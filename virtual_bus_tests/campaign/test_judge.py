@@ -236,7 +236,7 @@ STORIES = (
           plan(fault("driver_dies", 1.0, 4.0), fault("watchdog_starved", 0.9, 4.0, share=0.9), segments=LONG),
           "envelope", None, "watchdog:all", WATCHES_NOTHING),
     Story("a motor that brakes with all its force beside one with a reversed encoder, and drives without masters",
-          plan(fault("encoder_reversed", 0.8, 4.0, wheel=2), replace(CUT, start_s=0.85),
+          plan(fault("encoder_reversed", 0.84, 4.0, wheel=2), replace(CUT, start_s=0.85),
                segments=(stick(0.4, 0.0, 0.0, 9.0),)),
           "heartbeat", no_masters, "drives:heartbeat_consumer", TWO_MOTORS_A_SIDE),
     Story("a goal, and a joystick at zero that takes the base and lets go",

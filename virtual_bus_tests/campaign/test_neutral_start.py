@@ -286,6 +286,7 @@ def test_without_neutral_start_the_base_drives_off(
     event(hand)
     if event is not reset_while_no_scan_comes:
         hand.holds = None  # a radio gap, in which the driver sees its zero
+        hand.run(0.4)  # longer than its last command counts: the filter accepts a reset
         hand.wait_enabled()
         hand.holds = FORWARD
     assert not hand.stays()

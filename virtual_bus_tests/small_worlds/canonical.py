@@ -76,6 +76,9 @@ IGNORED = {
     "looked at by encoders that come and go, or jump: no event makes one": "Encoder._time_s",
     "a bound on when a heartbeat can be missed: of the times that are told anyway": "HeartbeatConsumer._none_before",
     "how late an answer is: none is late here": "SdoClient._requests GuardRequests._requests",
+    "which object of a drive that stands is read next, and that such readings become seldom: no stop waits for one": (
+        "Stopper._sdo_turn"
+    ),
 }
 """Why no decision looks at it → fields, as `Class.name`; a class stands for those that are derived from it."""
 UNSEEN = {field: reason for reason, fields in IGNORED.items() for field in fields.split()}

@@ -322,8 +322,10 @@ class Watchdog:
         if self._beats:
             out += self._guard.tick(now_s)
         status = self.status
-        if now_s >= self._state_due or status != self._told:
+        is_due = now_s >= self._state_due
+        if is_due:  # a frame for what is new comes between the others, and delays none of them
             self._state_due = max(self._state_due, now_s - STATE_PERIOD_S) + STATE_PERIOD_S
+        if is_due or status != self._told:
             self._told = status
             out.append(self._state_frame(status, now_s))
         if now_s >= self._counters_due:

@@ -155,6 +155,7 @@ class WatchdogLink:
         self._timeout_s = timeout_s
         self._state: WatchdogState | None = None
         self._received_s = -math.inf
+        self._hard_received = False
         self._request = 0
         self.counters = WatchdogCounters()
         """Its last state frame; zeros until then."""
@@ -165,6 +166,7 @@ class WatchdogLink:
         if state is None:
             return False
         self._state, self._received_s = state, now_s
+        self._hard_received = self._hard_received or state.brakes_hard
         return True
 
     def on_counters(self, frame: Frame, _now: float) -> bool:
@@ -235,8 +237,11 @@ class WatchdogLink:
         return WatchdogView.OK, ""
 
     def brakes_hard(self, now_s: float) -> bool:
-        """Whether the base has to brake hard. Without a recent state frame nobody knows, and that means hard."""
-        return self._state is None or self._state.brakes_hard or now_s - self._received_s > self._timeout_s
+        """Whether the base has to brake hard, asked once a cycle. Any frame since the last one that says so counts: one
+        behind it takes nothing back. Without a recent state frame nobody knows, and that means hard."""
+        received, self._hard_received = self._hard_received, False
+        hard = received or self._state is None or self._state.brakes_hard
+        return hard or now_s - self._received_s > self._timeout_s
 
     @property
     def about_drive(self) -> bool:

@@ -54,7 +54,7 @@ def test_a_sound_driver_sent_what_cmd_vel_orders(recordings: dict[str, RecordedI
     inputs = recordings["turns_and_stops"]
     found = replay_setpoints(inputs, robot_of(inputs))
     assert found.compared > 600
-    assert found.greatest_mps < 0.002
+    assert found.greatest_mps < 0.012  # one cycle of the ramp: a command that arrives with a cycle counts one later
     assert found.differences == ()
 
 
