@@ -22,6 +22,7 @@ import numpy as np
 from canbase_driver.boot import node_boot
 from canbase_driver.boot.sequence import boot
 from canbase_driver.boot.steps import BootError, Step
+from canbase_driver.cia301.sdo_client import SdoTimeout
 
 _SHARED = (Enum, Random, Struct, MappingProxyType, np.ndarray)
 """Kinds that are never changed: of chance nothing is left in a small world."""
@@ -58,12 +59,19 @@ class _Boot:
         self._steps = boot(*of, **named)
 
     def send(self, answer: bytes | bool | None) -> Step:
-        self._answers.append(answer)
+        self._note(answer)
         return self._steps.send(answer)
 
     def throw(self, error: Exception) -> Step:
-        self._answers.append(error)
+        self._note(error)
         return self._steps.throw(error)
+
+    def _note(self, answer: Any) -> None:
+        """A boot waits for ever for a drive that does not answer: its second round is its first one."""
+        self._answers.append(answer)
+        first, second = self._answers[1:3], self._answers[3:]
+        if any(isinstance(each, SdoTimeout) for each in first) and repr(first) == repr(second):
+            del self._answers[3:]
 
     def __getstate__(self) -> tuple[Any, Any, list[Any]]:
         return self._of, self._named, self._answers
