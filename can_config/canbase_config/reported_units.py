@@ -1,8 +1,8 @@
 """What a drive reports about its own units, compared with robot.yaml. CiA 402-2 (60A8h, 60A9h and their predecessors).
 
 A unit that differs is invisible later: setpoint and measured velocity agree, and the wheel turns 10 times as fast. An
-object that contradicts robot.yaml is a `Misfit`. An object that is missing, 0, 1/1 or in a unit that has no fixed ratio
-to a revolution proves nothing: "cannot tell" is not "fits", and `canbase commission` is the proof.
+object that contradicts robot.yaml is a `Misfit`. An object that is missing, 0 or 1/1, or whose unit has no fixed ratio
+to a revolution, does not show whether robot.yaml is right: `canbase commission` shows it, with the wheel.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ ROUNDING: Final = 1e-9
 class Reserve:
     """One key that must not be less than others demand.
 
-    `rule`: the least value, as somebody who writes robot.yaml computes it. `others`: the keys in it. `keys`: where
-    `key` is in this robot's file; several where it has a name in it.
+    `rule`: formula of the least value, for people. `least`: the same, computed [s or m]. `others`: the keys in the
+    formula. `keys`: the places of `key` in a robot.yaml: one for each source of the mux where it is a key of a source.
     """
 
     key: str
@@ -158,9 +158,8 @@ def _sentence(row: Reserve, given: float, least: float) -> str:
 
 def _locs(row: Reserve) -> list[Loc]:
     """Where else the file may have what is wrong: the key itself may be a default."""
-    return [
-        ("drives", 0, other[7:]) if other.startswith("drives.") else tuple(other.split(".")) for other in row.others
-    ]
+    drive = {COUNTS: ("drives", 0, COUNTS.removeprefix("drives."))}
+    return [drive.get(other, tuple(other.split("."))) for other in row.others]
 
 
 def rounded_up(value: float) -> float:

@@ -12,7 +12,7 @@ import socket
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from http import HTTPStatus
@@ -34,6 +34,7 @@ _BACKLOG: Final = 4096
 """A connection that the kernel drops is tried again after a second."""
 _LOOK_S: Final = 0.25
 _SECOND_S: Final = 1.0
+STOP_BROKEN: Final = "<p>STOP FAILED: a defect of canbase web. Press the emergency stop at the robot.</p>"
 _THIS_COMPUTER: Final = ("127.0.0.1", "::1")
 """Its programs and its tunnels are one peer: none of them is refused for what others do."""
 HEADERS: Final = (
@@ -141,14 +142,18 @@ class Listener:
             _send(connection, answer(verdict.status, verdict.sentence, login))
             connection.close()
         elif (request.method, request.path) == ("POST", "/stop"):
-            self._stops.submit(self._answer_stop, connection)
+            stopping = self._stops.submit(self._answer_stop, connection)
+            stopping.add_done_callback(Future.result)  # what it raises comes into the log (concurrent.futures)
         else:
             self._pass_on(connection, request.alone() + body)
 
     def _answer_stop(self, connection: socket.socket) -> None:
-        status, page = self._stop()
-        _send(connection, answer(status, page, kind="text/html"))
-        connection.close()
+        status, page = 503, STOP_BROKEN
+        try:
+            status, page = self._stop()
+        finally:  # whoever presses STOP has to know, also when it raises
+            _send(connection, answer(status, page, kind="text/html"))
+            connection.close()
 
     def _wait(self, waiting: _Waiting) -> None:
         """For the rest of its head; where too many do, the peer with the most of them loses its oldest."""

@@ -237,8 +237,8 @@ class WatchdogLink:
         return WatchdogView.OK, ""
 
     def brakes_hard(self, now_s: float) -> bool:
-        """Whether the base has to brake hard, asked once a cycle. Any frame since the last one that says so counts: one
-        behind it takes nothing back. Without a recent state frame nobody knows, and that means hard."""
+        """Whether the base has to brake hard. Called once in each control cycle: one state frame with the bit since the
+        last call is enough, whatever a later frame says. Without a recent state frame the base brakes hard."""
         received, self._hard_received = self._hard_received, False
         hard = received or self._state is None or self._state.brakes_hard
         return hard or now_s - self._received_s > self._timeout_s

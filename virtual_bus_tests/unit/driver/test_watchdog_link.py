@@ -151,3 +151,11 @@ def test_whether_to_brake_hard_is_in_its_state_frame_and_unknown_means_hard(
 ) -> None:
     assert link(data).brakes_hard(now_s) is hard
     assert WatchdogLink(timeout_s=0.2).brakes_hard(now_s)
+
+
+def test_a_frame_that_says_brake_hard_counts_in_its_cycle_whatever_the_next_frame_says() -> None:
+    made = WatchdogLink(timeout_s=0.2)
+    for at_s, data in ((10.000, "01 00 c0 00 14 00 00 00"), (10.001, "01 00 80 00 14 00 00 00")):
+        assert made.on_frame(Frame(0x1FE, bytes.fromhex(data)), at_s)
+    assert made.brakes_hard(10.01)
+    assert not made.brakes_hard(10.02)

@@ -158,3 +158,19 @@ def test_an_address_gets_few_new_connections_a_second_and_this_computer_all(
             except ConnectionError:
                 found.append("")
         assert found.count("page") == answers
+
+
+def test_whoever_presses_stop_is_told_when_it_raises_and_the_next_press_works(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with served() as port:
+        assert "Stop: stopping" in port.ask("POST /stop", port.host, port.mine)
+        works = port.listener._stop
+        monkeypatch.setattr(port.listener, "_stop", lambda: 1 / 0)
+        answered = port.ask("POST /stop", port.host, port.mine)
+        monkeypatch.setattr(port.listener, "_stop", works)
+        again = port.ask("POST /stop", port.host, port.mine)
+    assert answered.startswith("HTTP/1.1 503")
+    assert "STOP FAILED" in answered
+    assert again.startswith("HTTP/1.1 200")
+    assert "ZeroDivisionError" in caplog.text
