@@ -107,7 +107,7 @@ def test_a_drive_without_a_failure_has_the_ages_of_what_timeouts_watch(monkeypat
 
 def test_timeouts_that_are_too_short_stop_a_robot_with_which_nothing_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "DRIVES_S", 20.0)
-    timeouts = ROBOT.timeouts.model_copy(update={"watchdog_s": 0.05})
+    timeouts = ROBOT.timeouts.model_copy(update={"watchdog_s": 0.04})
     job, _ = job_of(ROBOT.model_copy(update={"timeouts": timeouts}), Load())
     (outcome,) = runs.run(job, Batch(DRIVING, 3, (3,)))
     assert [violation.property for violation in outcome.violations] == ["undisturbed"]
