@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
-from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport
+from hazards.proof_rules import pytest_itemcollected as pytest_itemcollected
+from hazards.proof_rules import pytest_runtest_makereport as pytest_runtest_makereport
 from hazards.tested import pytest_collection_modifyitems as pytest_collection_modifyitems
 from support.needs_root import pytest_runtest_setup as pytest_runtest_setup
 from support.second_run import pytest_sessionfinish as pytest_sessionfinish

@@ -181,7 +181,7 @@ class GoalRun:
         if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
             cause = replace(cause, code=ErrorCode.DRIVE_FAULT, message=self._unconfirmed())
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
-            message = "the base rolled past the goal: too fast for its load or the slope"
+            message = "the base rolled past the goal: too fast for its load or the slope, or the computer was late"
             cause = replace(cause, code=ErrorCode.OVERSHOOT, message=message)
         elif verdict is not Verdict.STANDS:
             cause = replace(cause, message=f"{cause.message}; the base {verdict.value}")

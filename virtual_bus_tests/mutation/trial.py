@@ -27,8 +27,8 @@ UNUSED = [f"-pno:{plugin}" for plugin in ("cacheprovider", "faulthandler", "thre
 """Parts of pytest that take time and would kill no mutant."""
 PRELOADED = ("hypothesis", "can", "canbase_config.load", "canbase_config.derive", "canbase_sim.world.bench")
 """Imported once, before the forks; nothing that is mutated may be among it."""
-HOOK = "hazards.skipped"
-"""Of conftest.py: it judges skipped tests, kills no mutant, and imports half of the project each time."""
+HOOK = "hazards.proof_rules"
+"""Of conftest.py: it judges proofs, kills no mutant, and imports half of the project each time."""
 
 
 class _Loader(importlib.abc.InspectLoader):

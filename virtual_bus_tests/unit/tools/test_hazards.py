@@ -166,7 +166,7 @@ def test_two_rows_with_one_id_are_refused() -> None:
 
 
 HOOKS = """
-from hazards.skipped import pytest_runtest_makereport as pytest_runtest_makereport
+from hazards.proof_rules import pytest_runtest_makereport as pytest_runtest_makereport
 from support.needs_root import pytest_runtest_setup as pytest_runtest_setup
 """
 SKIPPED = "import pytest\n\n@pytest.mark.skip(reason='no time')\ndef test_it() -> None: ...\n"
@@ -200,3 +200,28 @@ def test_a_skipped_proof_fails_unless_it_waits_for_root(
     result = pytester.runpytest_inprocess("-p", "no:cacheprovider", "-rs")
     result.assert_outcomes(**outcomes)
     assert ("NOT CHECKED: needs root, to give a file away" in result.stdout.str()) == (text is NEEDS_ROOT and user != 0)
+
+
+UNSTEADY = """
+runs = []
+
+def test_it():
+    runs.append("run")
+    assert len(runs) > 1, "stopped 0.3 s late"
+"""
+
+
+def test_a_proof_that_fails_does_not_run_again(pytester: pytest.Pytester) -> None:
+    """A proof and a test that is none both fail at their first run: the second alone may pass at its second."""
+    pytester.makeconftest("from hazards.proof_rules import pytest_itemcollected as pytest_itemcollected")
+    name = next(name for name in sorted(proofs.pytest_names(CATALOGUE)) if name.startswith("ros/") and "::" not in name)
+    path = pytester.path / name
+    path.parent.mkdir(parents=True)
+    path.write_text(UNSTEADY)
+    path.with_name("test_other.py").write_text(UNSTEADY)
+    result = pytester.runpytest_inprocess("--reruns", "1", "-p", "no:cacheprovider")
+    assert {kind: result.parseoutcomes().get(kind) for kind in ("failed", "passed", "rerun")} == {
+        "failed": 1,
+        "passed": 1,
+        "rerun": 1,
+    }
