@@ -61,7 +61,7 @@ def preload() -> None:
     for name in PRELOADED:
         importlib.import_module(name)
     sys.modules[HOOK] = ModuleType(HOOK)
-    vars(sys.modules[HOOK])["pytest_runtest_makereport"] = None
+    vars(sys.modules[HOOK]).update(pytest_itemcollected=None, pytest_runtest_makereport=None)
     gc.collect()
     gc.freeze()
 
