@@ -84,6 +84,10 @@ same-frames: build/compiled/ready ## SEEDS=10 scenarios and robots, interpreted 
 teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign has to find it missing; ONLY=filter:estop one
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.teeth --write $(ONLY)
 
+.PHONY: hazard-cases
+hazard-cases: $(WORLD_READY) ## the stated times of hazards on ROBOTS=20 drawn robots, straight on, on curves and in place; FIRST=20 other ones, ONLY=force some
+	PYTHONPATH=$(WORLD) python -m campaign.hazard_cases $(if $(ROBOTS),--robots $(ROBOTS)) $(if $(FIRST),--first $(FIRST)) $(if $(ONLY),--only $(ONLY))
+
 .PHONY: stops
 stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some
 	PYTHONPATH=$(WORLD) python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'

@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from canbase_config.units import mps_per_bit
 from canbase_config.watchdog import STATE_PERIOD_S
 
 if TYPE_CHECKING:
@@ -118,13 +119,19 @@ def given_up_s(robot: Robot) -> float:
 def stuck_s(robot: Robot) -> float:
     """The time for which a driver that repeats its setpoints is followed after an order of zero [s].
 
-    Until no other order may be under way, and the jerk-limited ramp has lost the tolerance.
+    Until no other order may be under way, and the jerk-limited ramp has lost the tolerance of the fastest wheel, also
+    on a curve or in place. Setpoints within the tolerance count as creeping (watchdog/creep.py).
     """
-    limits, slack_mps = robot.limits, robot.watchdog.target_tolerance_mps
+    limits = robot.limits
+    slack_mps = robot.watchdog.target_tolerance_mps + max(abs(bit) for bit in _bits_mps(robot))
+    turning_mps2 = limits.angular_deceleration_radps2 * robot.base.track_m / 2.0
     soft_s = math.sqrt(2.0 * slack_mps / limits.jerk_mps3)
-    straight_s = slack_mps / limits.deceleration_mps2 + limits.deceleration_mps2 / limits.jerk_mps3 / 2.0
-    falls_s = soft_s if soft_s <= limits.deceleration_mps2 / limits.jerk_mps3 else straight_s
-    return order_wait_s(robot) + SEEN_LATE_S + falls_s
+    straight_s = slack_mps / min(limits.deceleration_mps2, turning_mps2)
+    return order_wait_s(robot) + SEEN_LATE_S + max(soft_s, straight_s + soft_s / 2.0)
+
+
+def _bits_mps(robot: Robot) -> list[float]:
+    return [mps_per_bit(drive, robot.base.radius_m(drive.side)) for drive in robot.drives]
 
 
 def stuck_otherwise_s(robot: Robot) -> float:

@@ -7,6 +7,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from canbase_config import stopping
 from canbase_config.robot import Robot
 
 _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -15,6 +16,10 @@ _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
+_STOPPING: dict[str, Callable[[Robot], float]] = {
+    each.__name__: each for each in (stopping.longest_ramp_s, stopping.standstill_s, stopping.stuck_s)
+}
+"""Times that robot.yaml decides by more than + - * /, by their name behind `stopping.`."""
 _FUNCTIONS: dict[str, Callable[..., float]] = {"max": max, "min": min}
 
 
@@ -25,7 +30,8 @@ class FormulaError(ValueError):
 def evaluate(text: str, robot: Robot) -> float:
     """The value of a formula for one robot, in the unit of its keys.
 
-    Known are numbers, + - * /, max(), min(), and the keys of robot.yaml by their path. Raises FormulaError otherwise.
+    Known are numbers, + - * /, max(), min(), the keys of robot.yaml by their path, and `stopping.stuck_s` and others of
+    canbase_config/stopping.py. Raises FormulaError otherwise.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval")
@@ -44,6 +50,8 @@ def _value(node: ast.expr, robot: Robot) -> Any:
         return _FUNCTIONS[node.func.id](*(_number(_value(each, robot), ast.unparse(each)) for each in node.args))
     if isinstance(node, ast.Name):
         return _key(robot, node.id, ast.unparse(node))
+    if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "stopping" and node.attr in _STOPPING:
+        return _STOPPING[node.attr](robot)
     if isinstance(node, ast.Attribute):
         return _key(_value(node.value, robot), node.attr, ast.unparse(node))
     raise FormulaError(f"{ast.unparse(node)!r}: only numbers, + - * /, max(), min() and keys of robot.yaml are known")

@@ -44,6 +44,8 @@ class Run:
     """Of the base when the failure began."""
     cause: str = ""
     """Which part reported first that it stops the base, and why; empty: none did."""
+    acts_s: float = math.inf
+    """Until that report [s]; infinity: none."""
 
 
 class RunError(RuntimeError):
@@ -53,17 +55,21 @@ class RunError(RuntimeError):
 class Cruise:
     """A world whose base drives steadily. The joystick orders `ordered`, for ever; None: it publishes nothing."""
 
-    def __init__(self, by: str, speed_mps: float = SPEED_MPS, drawn: DrawnRobot | None = None) -> None:
-        """`drawn`: None: the sample robot. Raises RuntimeError: its drives cannot be enabled."""
+    def __init__(
+        self, by: str, speed_mps: float = SPEED_MPS, drawn: DrawnRobot | None = None, turn_radps: float = 0.0
+    ) -> None:
+        """`drawn`: None: the sample robot. `turn_radps`: of the joystick. Raises RuntimeError: its drives cannot be
+        enabled."""
         start = Start(drawn)
         self.world, self.around = start.world, start.around
         self.around.cruise_mps = speed_mps
-        self.ordered: Twist | None = Twist(speed_mps, 0.0) if by == JOYSTICK else None
+        self.ordered: Twist | None = Twist(speed_mps, turn_radps) if by == JOYSTICK else None
         if by == GOAL:
             self.world.action.send_goal(self._goal_m(speed_mps), speed_mps)
         self._push()
         limits = self.world.robot.limits
-        speeds_up_s = speed_mps / limits.acceleration_mps2 + jerk_adds_s(limits)
+        turns_s = abs(turn_radps) / limits.angular_acceleration_radps2
+        speeds_up_s = max(abs(speed_mps) / limits.acceleration_mps2, turns_s) + jerk_adds_s(limits)
         self.world.clock.run_until(self.world.clock.now_s + max(CRUISES_S, speeds_up_s + STEADY_S))
 
     def _goal_m(self, speed_mps: float) -> float:
@@ -108,7 +114,7 @@ class _Watch:
 
     def __init__(self, world: World) -> None:
         self._world, self._peak_mps, self._power_off_at = world, 0.0, math.inf
-        self._longest_s, self._cause = longest_stop_s(world.drawn), ""
+        self._longest_s, self._cause, self._acts_at = longest_stop_s(world.drawn), "", math.inf
         self.begin()
 
     def begin(self) -> None:
@@ -134,6 +140,7 @@ class _Watch:
         rim_mps = max(abs(drives.base.v_left_mps), abs(drives.base.v_right_mps))
         self._peak_mps = max(self._peak_mps, rim_mps)
         self._cause = self._cause or _cause(self._world)
+        self._acts_at = min(self._acts_at, clock.now_s if self._cause else math.inf)
         if rim_mps > self._world.robot.base.standstill_mps:
             self._moved_at = clock.now_s
         if any(axis.motor.powered for node in drives.nodes.values() for axis in node.axes):
@@ -149,7 +156,8 @@ class _Watch:
         distance_m = math.dist(self._from_m, (base.x_m, base.y_m))
         time_s = self._moved_at - self._began if stood else math.inf
         power_off_s = self._power_off_at - self._began
-        return Run(time_s, distance_m, power_off_s, self._peak_mps, self._from_mps, self._cause)
+        acts_s = self._acts_at - self._began
+        return Run(time_s, distance_m, power_off_s, self._peak_mps, self._from_mps, self._cause, acts_s)
 
 
 def longest_stop_s(drawn: DrawnRobot) -> float:

@@ -110,7 +110,7 @@ def test_a_robot_that_wants_no_proof_of_a_stand_is_told_what_is_not_found(profil
 
 
 @pytest.mark.parametrize(
-    ("jerk", "told"), [(0.1, "up to 1.14 s (0.92 m) after an order of zero"), (0.5, "0.72 s"), (5.0, "")]
+    ("jerk", "told"), [(0.1, "up to 1.15 s (0.92 m) after an order of zero"), (0.5, "0.72 s"), (5.0, "")]
 )
 def test_a_low_jerk_says_how_long_a_driver_that_hangs_is_followed(jerk: float, told: str) -> None:
     robot = load_robot(sample("bench")).robot
