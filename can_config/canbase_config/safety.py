@@ -25,6 +25,15 @@ class Scan(Section):
     y_m: Annotated[float, Field(ge=-5.0, le=5.0, description="scanner in base_link [m]")] = 0.0
     yaw_rad: Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, description="scanner in base_link [rad]")] = 0.0
     upside_down: Annotated[bool, Field(description="mounted with its z axis down (roll π)")] = False
+    range_m: Annotated[
+        float | None,
+        Field(
+            gt=0.0,
+            le=200.0,
+            description="how far it detects what the base must not touch, also dark things; nothing beyond it counts "
+            "as free; none: range_max of its scans [m]",
+        ),
+    ] = None
     min_points: Annotated[
         int, Field(ge=1, le=10, description="fewer adjacent beams count only if the next scan sees them again")
     ] = 2

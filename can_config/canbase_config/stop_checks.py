@@ -5,6 +5,7 @@ What cannot be used at all is refused by `robot.py`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
@@ -14,6 +15,7 @@ from canbase_config.stopping import (
     longest_quick_stop_s,
     max_wheel_mps,
     quick_stop,
+    ramp,
     stuck_otherwise_s,
     stuck_s,
 )
@@ -21,6 +23,7 @@ from canbase_config.stopping import (
 if TYPE_CHECKING:
     from canbase_config.drive import Drive
     from canbase_config.robot import Robot
+    from canbase_config.safety import Scan
 
 DISABLE_VOLTAGE: Final = 2
 """6007h: a drive that loses its masters lets its motor coast (CiA 402-2)."""
@@ -31,6 +34,7 @@ SLOWEST_HZ: Final = 50.0
 """Below this the peak speed of a wheel without an encoder is noticeably above that of the bench."""
 RUNAWAY_MPS2: Final = 5.0
 """A wheel of the bench gains so much by the whole force of its motor, when its encoder is dead."""
+_HALVINGS: Final = 30
 
 
 def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
@@ -46,6 +50,41 @@ def uncertain_stops(robot: Robot) -> Iterator[tuple[Loc, str]]:
     if robot.rates.control_hz < SLOWEST_HZ:
         yield ("rates", "control_hz"), _slow_cycles(robot)
     yield from _unknown_ages(robot)
+    yield from _short_ranges(robot)
+
+
+def _short_ranges(robot: Robot) -> Iterator[tuple[Loc, str]]:
+    for index, scan in enumerate(robot.safety.scans):
+        needs_m = needed_range_m(robot, scan, robot.limits.linear_mps)
+        if scan.range_m is not None and scan.range_m < needs_m:
+            place: Loc = ("safety", "scan") if index == 0 else ("safety", "more_scans", index - 1)
+            yield (*place, "range_m"), _short_range(robot, scan, scan.range_m, needs_m)
+
+
+def _short_range(robot: Robot, scan: Scan, range_m: float, needs_m: float) -> str:
+    slow_mps, fast_mps = 0.0, robot.limits.linear_mps
+    for _ in range(_HALVINGS):
+        middle = (slow_mps + fast_mps) / 2.0
+        slow_mps, fast_mps = (
+            (middle, fast_mps) if needed_range_m(robot, scan, middle) <= range_m else (slow_mps, middle)
+        )
+    return (
+        f"limits.linear_mps {robot.limits.linear_mps:g} needs a scanner with a range of {needs_m:.2f} m: until the "
+        f"base is stationary, by a scan as old as timeout_s; the range of {scan.topic} is {range_m:g} m, so straight "
+        f"on, where no other scanner looks, the base drives at most {max(slow_mps, robot.safety.blind_mps):.2f} m/s"
+    )
+
+
+def needed_range_m(robot: Robot, scan: Scan, linear_mps: float) -> float:
+    """From the scanner to the farthest corner of the footprint where the base is stationary again, straight on the way
+    that the scanner looks [m]. As the safety filter has it (velocity_mux, obstacle.py, rule 6)."""
+    safety = robot.safety
+    moves_s = scan.timeout_s + 1.0 / robot.rates.command_hz + safety.reaction_s
+    way_m = safety.stop_distance_m + linear_mps * moves_s + ramp(robot.limits, linear_mps).distance_m
+    forward = math.cos(scan.yaw_rad) >= 0.0
+    edge_m = safety.footprint.front_m - scan.x_m if forward else safety.footprint.rear_m + scan.x_m
+    aside_m = max(safety.footprint.left_m - scan.y_m, safety.footprint.right_m + scan.y_m)
+    return math.hypot(edge_m + safety.padding_m + way_m, aside_m + safety.padding_m)
 
 
 def _unknown_ages(robot: Robot) -> Iterator[tuple[Loc, str]]:

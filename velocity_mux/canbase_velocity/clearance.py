@@ -69,6 +69,11 @@ class Field:
         seen: Bools = faces & (ranges_m <= self.range_max_m)
         return seen
 
+    def faces(self, points: Floats) -> tuple[Bools, Bools]:
+        """Which of these places it faces, at any range, and which of them are within its range."""
+        ranges_m, _, faces = self._looks_at(points)
+        return faces, faces & (ranges_m <= self.range_max_m)
+
     def covers(self, points: Floats) -> tuple[Bools, Bools]:
         """Which of these places it faces, at any range, and at which of them its newest scan has a reading."""
         ranges_m, from_first_rad, faces = self._looks_at(points)
@@ -140,7 +145,8 @@ class ScanReader:
         if not (self._config.allow_empty or np.isfinite(hit_m).any()):
             raise ScanError("it sees nothing at all, and allow_empty is false")
         says = None if usable.all() else np.flatnonzero(usable if scan.angle_increment_rad > 0.0 else usable[::-1])
-        return View(self._points(scan, hit_m, placement), field_of(scan, placement, says), float(usable.mean()))
+        field = field_of(scan, placement, says, math.inf if self._config.range_m is None else self._config.range_m)
+        return View(self._points(scan, hit_m, placement), field, float(usable.mean()))
 
     def _points(self, scan: Scan, hit_m: Floats, placement: Placement) -> Points:
         together = -(-hit_m.size // MAX_BEAMS)
@@ -193,8 +199,11 @@ class ScanReader:
         self._cos, self._sin, self._geometry = np.cos(angles_rad), np.sin(angles_rad), geometry
 
 
-def field_of(scan: Scan, placement: Placement, says: npt.NDArray[np.intp] | None = None) -> Field:
-    """The field of view of a scan that can be used. Each beam counts for one increment. `says`: as in `Field`."""
+def field_of(
+    scan: Scan, placement: Placement, says: npt.NDArray[np.intp] | None = None, range_m: float = math.inf
+) -> Field:
+    """The field of view of a scan that can be used. Each beam counts for one increment. `says`: as in `Field`.
+    `range_m`: what robot.yaml states as the scanner's range [m]."""
     increment_rad = abs(scan.angle_increment_rad)
     span_rad = increment_rad * (scan.count - 1)
     first_rad = scan.angle_min_rad - (span_rad if scan.angle_increment_rad < 0.0 else 0.0)
@@ -203,7 +212,7 @@ def field_of(scan: Scan, placement: Placement, says: npt.NDArray[np.intp] | None
         first_rad=first_rad - increment_rad / 2.0,
         span_rad=span_rad + increment_rad,
         range_min_m=scan.range_min_m,
-        range_max_m=scan.range_max_m,
+        range_max_m=min(scan.range_max_m, range_m),
         increment_rad=increment_rad,
         says=says if increment_rad > 0.0 else None,
     )

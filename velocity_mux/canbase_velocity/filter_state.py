@@ -314,7 +314,8 @@ class SafetyFilter:
         fields = tuple(field for field in known if field is not None)
         sees_all = any(scanner.field is None for scanner in fresh)
         points = np.concatenate(parts) if len(parts) > 2 else parts[-1]
-        return Sight(points, () if sees_all else fields)
+        ages_s = (max(now_s - scanner.measured_from_s, scanner.config.timeout_s) for scanner in fresh)
+        return Sight(points, () if sees_all else fields, max(ages_s, default=0.0))
 
     def _advance_estop(self, now_s: float) -> None:
         """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""

@@ -233,11 +233,25 @@ def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     if obstacle.is_blind(command, sight, geometry):
         why = "no scanner looks where the command leads"
         found.append(_blind(command, StopCause.BLIND, why, "a command to where a scanner looks", config))
-    share = obstacle.told_share(command, sight, geometry)
+    in_range = obstacle.range_share(command, sight, geometry)
+    if in_range < 1.0:
+        found.append(_out_of_range(command, in_range, sight, config))
+    slower = command.scaled(in_range)
+    share = 1.0 if slower.is_zero else obstacle.told_share(slower, sight, geometry)
     if share < safety.usable_share:
         why = f"{share:.0%} of the places ahead have usable readings, at least {safety.usable_share:.0%} are needed"
         found.append(_blind(command, StopCause.SCAN_BLIND, why, "more usable readings, or another direction", config))
     return found
+
+
+def _out_of_range(command: Twist, share: float, sight: Sight, config: FilterConfig) -> Finding:
+    """Faster than this the base would not stop within what its scanners see; slower than blind_mps it need not be."""
+    allowed_mps = share * fastest_mps(config.geometry.box, command)
+    ranges = ", ".join(f"{field.range_max_m:g} m" for field in sight.fields)
+    why, cure = f"scanners with a range of {ranges} and no longer", "a slower command, or a scanner with a longer range"
+    if allowed_mps < max(config.safety.blind_mps, config.standstill_mps):
+        return _blind(command, StopCause.BLIND, why, cure, config)
+    return replace(_limit(command, share, StopCause.BLIND, cure), detail=f"{why}: {_allowed(command, share)}")
 
 
 def _lost_all(scans: tuple[ScanState, ...]) -> bool:
@@ -248,12 +262,15 @@ def _lost_all(scans: tuple[ScanState, ...]) -> bool:
 def _limit(command: Twist, factor: float, cause: StopCause, clears_on: str) -> Finding:
     if factor >= 1.0:
         return PASSED
+    return Finding(Action.LIMIT, cause, _allowed(command, factor), clears_on, factor)
+
+
+def _allowed(command: Twist, factor: float) -> str:
     allowed = command.scaled(factor)
-    detail = (
+    return (
         f"{command.linear_mps:.2f} m/s, {command.angular_radps:.2f} rad/s ordered, "
         f"{allowed.linear_mps:.2f} m/s, {allowed.angular_radps:.2f} rad/s allowed"
     )
-    return Finding(Action.LIMIT, cause, detail, clears_on, factor)
 
 
 def _blind(command: Twist, cause: StopCause, why: str, clears_on: str, config: FilterConfig) -> Finding:

@@ -177,3 +177,28 @@ def test_keys_that_make_what_no_scanner_sees_count_as_free_are_refused(tmp_path:
     file.write_text(text.replace("\nsafety:\n", f"\nsafety:\n  {key}: {value}\n"))
     with pytest.raises(ConfigError, match=rf"safety\.{key}"):
         load_robot(file)
+
+
+@pytest.mark.parametrize(
+    ("range_m", "told"),
+    [
+        (None, ""),
+        (30.0, ""),
+        (6.0, ""),
+        (4.0, "limits.linear_mps 3 needs a scanner with a range of 4.95 m"),
+        (
+            4.0,
+            "the range of scan is 4 m, so straight on, where no other scanner looks, the base drives at most 2.59 m/s",
+        ),
+        (0.2, "at most 0.15 m/s"),
+    ],
+)
+def test_a_range_that_is_too_short_for_the_speed_is_reported_with_the_speed_that_is_left(
+    range_m: float | None, told: str
+) -> None:
+    robot = load_robot(sample("bench")).robot
+    values = robot.model_dump()
+    values["limits"] |= {"linear_mps": 3.0, "deceleration_mps2": 1.5, "emergency_deceleration_mps2": 3.0}
+    values["safety"]["scan"]["range_m"] = range_m
+    sentences = [text for place, text in uncertain_stops(Robot.model_validate(values)) if place[-1] == "range_m"]
+    assert [told in text for text in sentences] == ([True] if told else [])

@@ -194,7 +194,7 @@ def test_a_scanner_whose_reach_is_shorter_than_the_way_to_stop_lets_the_base_cre
         return dataclasses.replace(scan, range_max_m=0.5)
 
     _, causes, fastest = lies(world(), fault, 2.0)
-    assert StopCause.SCAN_BLIND in causes
+    assert StopCause.BLIND in causes
     assert fastest <= 0.15 + 1e-9
 
 
