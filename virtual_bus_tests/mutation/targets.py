@@ -25,7 +25,7 @@ FILTER = (
     "velocity/estop_record",
 )
 """Tests of the safety filter as a whole."""
-LONG = "noise or minutes or minute"
+LONG = "noise_neither_raises or no_noise_untrips or noise_never_raises or no_frame_raises or minute"
 """Tests that are left out: long, and about exceptions and false trips, which the others notice as well."""
 
 
@@ -132,5 +132,5 @@ TARGETS = (
     _velocity("estop"),
     _action("causes"),
     _action("goal", then=("action_server/active_goal",)),
-    _action("standstill", "action_server/goal", then=()),
+    _action("standstill"),
 )

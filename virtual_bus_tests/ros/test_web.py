@@ -9,6 +9,7 @@ import contextlib
 import math
 import os
 import random
+import resource
 import signal
 import socket
 import subprocess
@@ -81,6 +82,13 @@ class Site:
         try:
             self.robot.node.wait_for(lambda: page.evaluate(script), 15.0, script)
         except AssertionError as error:
+            raise AssertionError(f"{error}; the page shows: {page.inner_text('body')}") from None
+
+    def shows(self, page: Any, text: str) -> None:
+        """Until the page shows the text, even for one frame."""
+        try:
+            page.wait_for_function(f"document.body.innerText.includes('{text}')", timeout=20_000)
+        except playwright.TimeoutError as error:
             raise AssertionError(f"{error}; the page shows: {page.inner_text('body')}") from None
 
     def unlocked(self) -> Any:
@@ -336,8 +344,8 @@ def test_the_stop_works_without_the_pages_script(site: Site) -> None:
 def test_a_goal_shows_its_progress_and_its_end_and_arrow_keys_drive(site: Site) -> None:
     page = site.unlocked()
     page.get_by_role("button", name="Drive", exact=True).click()
-    page.wait_for_function("document.body.innerText.includes('m left')")
-    page.wait_for_function("document.body.innerText.includes('SUCCEEDED (OK)')", timeout=20_000)
+    site.shows(page, "m left")
+    site.shows(page, "SUCCEEDED (OK)")
     page.locator("body").click(position={"x": 5, "y": 300})
     page.keyboard.down("ArrowLeft")
     page.wait_for_function("document.getElementById('hold-state').textContent === 'drives'")
@@ -375,6 +383,9 @@ def test_who_is_not_let_in_is_refused_and_the_robot_does_not_notice(site: Site) 
     assert _status(site, "POST /stop", mine + "Content-Length: 99999999\r\n") == 413
     assert _status(site, "GET /docs", mine) == 404
     with ExitStack() as held:
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)  # 1024 of most users, and this process has other files
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, 4096), hard), hard))
+        held.callback(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
         for _ in range(1000):
             connection = socket.create_connection(("127.0.0.1", site.port), 5.0)
             held.callback(connection.close)

@@ -12,7 +12,6 @@ without an order, and costs the others nothing. Pure.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 
 from canbase_config.derive import BRAKING_SAMPLES, LEAST_SAMPLES, samples, slope_window_s, speed_noise_mps
@@ -26,17 +25,12 @@ LASTS_S = 0.08
 class Slowing:
     """The fastest speed of the last moments, each as a height above the line that falls as it must at least."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, now_s: float) -> None:
+        """A quick stop begins now."""
         self._least_mps2 = SLOPE_SHARE * robot.limits.deceleration_mps2
         self._noise_mps, self._floor_mps = speed_noise_mps(robot), robot.watchdog.motion_tolerance_mps
         self._window_s, self._lag_s = slope_window_s(robot), lag_s(robot)
         self._past: deque[tuple[float, float]] = deque()
-        self._since = self._slow_at = -math.inf
-        self._bad = 0
-
-    def begin(self, now_s: float) -> None:
-        """A quick stop begins now."""
-        self._past.clear()
         self._since = self._slow_at = now_s
         self._bad = 0
 
@@ -55,28 +49,24 @@ class Slowing:
 
 
 class Braking:
-    """Watches one step of a stop after the other."""
+    """Watches one step of a stop after the other. `begin` comes first."""
 
     def __init__(self, robot: Robot) -> None:
-        self._limits, self._lag_s = robot.limits, lag_s(robot)
+        self._robot, self._lag_s, self._cycles = robot, lag_s(robot), samples(robot, BRAKING_SAMPLES)
         self._fixed_mps = robot.watchdog.motion_tolerance_mps
         self._share = robot.watchdog.motion_tolerance_share
-        self._since = -math.inf
-        self._from_mps = self._slope_mps2 = 0.0
-        self._against = 0
-        self._slowing, self._cycles = Slowing(robot), samples(robot, BRAKING_SAMPLES)
 
     def begin(self, speed_mps: float, turn_radps: float, now_s: float, quick: bool) -> None:
         """A ramp, or a quick stop of the drives, from this wheel speed and turn of the base, begins now."""
         speed_mps, turn_radps = abs(speed_mps), abs(turn_radps)
         self._since, self._against = now_s, 0
-        self._slowing.begin(now_s)
+        self._slowing = Slowing(self._robot, now_s)
         self._from_mps = speed_mps * (1.0 + self._share) + self._fixed_mps
-        ordinary = self._limits.deceleration_mps2
+        limits = self._robot.limits
         if quick:
-            self._slope_mps2 = BRAKING_SHARE * ordinary
+            self._slope_mps2 = BRAKING_SHARE * limits.deceleration_mps2
         else:
-            time_s = ramp(self._limits, max(speed_mps, self._fixed_mps), turn_radps).time_s
+            time_s = ramp(limits, max(speed_mps, self._fixed_mps), turn_radps).time_s
             self._slope_mps2 = BRAKING_SHARE * max(speed_mps, self._fixed_mps) / time_s
 
     def allowed_mps(self, now_s: float) -> float:

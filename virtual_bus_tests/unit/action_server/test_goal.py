@@ -9,15 +9,12 @@ import pytest
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_request import DriveRequest
-from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
+from canbase_action_server.inputs import Mux, Odometry, Safety
 from canbase_action_server.motion import Twist
 from canbase_action_server.outcome import ErrorCode, Status
-from canbase_action_server.standstill import Standstill, StandstillLimits, Verdict
 from canbase_config.stopping import standstill_s
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.received import Received
 from canbase_runtime.stop_cause import StopCause
-from canbase_runtime.watchdog_view import WatchdogView
 from support.action_plant import (
     GOOD_SAFETY,
     Plant,
@@ -302,80 +299,6 @@ def test_feedback_comes_at_its_rate() -> None:
     goal = goal_run(robot, 1.0, 0.3, plant.odometry(0.0))
     orders = [goal.tick(good_inputs(plant.odometry(cycle * 0.02)), cycle * 0.02) for cycle in range(100)]
     assert 17 <= len([order for order in orders if order.feedback]) <= 21  # 2 s at 10 Hz
-
-
-STILL = StandstillLimits(
-    linear_mps=0.005,
-    angular_radps=0.02,
-    noise_mps=0.05,
-    noise_radps=0.2,
-    odometry_timeout_s=0.2,
-    driver_timeout_s=0.3,
-    deceleration_mps2=1.0,
-    give_up_s=3.0,
-)
-
-
-def moving_at(received: float, linear_mps: float, angular_radps: float = 0.0) -> Inputs:
-    odometry = replace(Plant().odometry(received), linear_mps=linear_mps, angular_radps=angular_radps)
-    return Inputs(Received(odometry, received))
-
-
-def test_standing_is_seen_for_a_while_after_the_order_had_time_to_act() -> None:
-    # ordered 0.0 ... counts from 0.15 ... moves at 0.2 ... stands from 0.3 ... held for 0.1 s: 0.4
-    watch = Standstill(STILL, began=0.0, speed_mps=0.1)
-    samples = [(0.05, 0.0), (0.16, 0.0), (0.2, -0.006), (0.3, 0.005), (0.35, -0.005), (0.39, 0.0), (0.41, 0.0)]
-    seen = [watch.judge(moving_at(at, speed), at) for at, speed in samples]
-    assert seen == [Verdict.WAIT] * 6 + [Verdict.STANDS]
-
-
-def test_turning_is_not_standing() -> None:
-    watch = Standstill(STILL, began=0.0, speed_mps=0.1)
-    seen = {watch.judge(moving_at(cycle * 0.05, 0.0, 0.03), cycle * 0.05) for cycle in range(60)}
-    assert seen == {Verdict.WAIT}
-    assert watch.judge(moving_at(3.0, 0.0, 0.03), 3.0) is Verdict.STILL_MOVES
-
-
-STANDS = Driver(DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True)
-
-
-@pytest.mark.parametrize(
-    ("linear_mps", "angular_radps", "seen"),
-    [(0.02, 0.0, True), (-0.02, 0.15, True), (0.051, 0.0, False), (0.0, 0.21, False)],
-)
-def test_noise_is_no_motion_where_the_driver_reports_standstill(
-    linear_mps: float, angular_radps: float, seen: bool
-) -> None:
-    """t   0  ordered to stop ── 0.2  the pose is still, odom shows some speed ── 0.4  status: standstill"""
-    noisy, after = (moving_at(at_s, linear_mps, angular_radps) for at_s in (0.2, 0.41))
-    after_a_moment = replaced(after, 0.41, driver=STANDS)
-
-    def judged(*samples: Inputs) -> Verdict:
-        watch = Standstill(STILL, began=0.0, speed_mps=0.3)
-        return [watch.judge(each, each.odometry.received_at_s) for each in samples][-1]
-
-    assert judged(after_a_moment) is Verdict.WAIT, "a pose alone shows no motion"
-    assert judged(noisy, replaced(after, 0.14, driver=STANDS)) is Verdict.WAIT, "of before the order could act"
-    assert judged(noisy, replaced(after, 0.41, driver=replace(STANDS, standstill=False))) is Verdict.WAIT
-    assert judged(noisy, after) is Verdict.WAIT
-    assert (judged(noisy, after_a_moment) is Verdict.STANDS) is seen
-
-
-@pytest.mark.parametrize("moved", [Pose(0.0011, 0.0, 0.0), Pose(0.0, -0.0011, 0.0), Pose(0.0, 0.0, 0.0041)])
-def test_a_pose_that_moves_is_no_noise(moved: Pose) -> None:
-    watch = Standstill(STILL, began=0.0, speed_mps=0.3)
-    for at_s, pose in ((0.2, Pose(0.0, 0.0, 0.0)), (0.41, moved)):
-        odometry = Odometry(at_s, pose, 0.02, 0.0)
-        assert watch.judge(replaced(Inputs(), at_s, odometry=odometry, driver=STANDS), at_s) is Verdict.WAIT
-
-
-def test_an_old_word_of_the_driver_is_no_word() -> None:
-    watch = Standstill(STILL, began=0.0, speed_mps=0.1)
-    assert (
-        watch.judge(Inputs(driver=Received(STANDS, 0.14)), 0.2) is Verdict.WAIT
-    )  # received before the order could act
-    assert watch.judge(Inputs(driver=Received(STANDS, 0.19)), 0.5) is Verdict.WAIT  # 0.31 s old
-    assert watch.judge(Inputs(driver=Received(STANDS, 0.2)), 0.5) is Verdict.STANDS
 
 
 def test_a_base_that_another_source_took_over_is_not_said_to_stand() -> None:

@@ -202,6 +202,14 @@ def test_a_target_that_comes_too_near_for_the_jerk_limit_is_reached_and_not_pass
     assert speeds.index(near.linear_mps) == 4  # 5 mm/s at 10 m/s³ take √(2 × 0.005 / 10) s = 32 ms
 
 
+def test_an_acceleration_too_steep_for_what_is_left_drops_at_once_to_what_the_jerk_limit_takes_back() -> None:
+    """At 0.5 m/s², 5 mm/s are left: √(2 × 10 × 0.005) = 0.316 m/s² is the steepest that 10 m/s³ ends in time."""
+    steep = MotionState(Twist2D(0.5, 0.0), 0.5)
+    after = LIMITER.step(steep, Twist2D(0.505, 0.0), 0.01)
+    assert after.acceleration_mps2 == pytest.approx(math.sqrt(0.1) - 10.0 * 0.01)
+    assert after.twist.linear_mps == pytest.approx(0.5 + math.sqrt(0.1) * 0.01 - 10.0 * 0.01**2 / 2.0)
+
+
 def test_a_target_that_trembles_around_the_speed_is_followed_exactly() -> None:
     state = drive(LIMITER, MotionState.AT_REST, Twist2D(0.5, 0.0), 1.5)[-1]
     for _ in range(50):
@@ -264,3 +272,8 @@ def test_an_emergency_stop_that_has_begun_goes_on_to_zero_whatever_is_requested_
     assert states[1 : zero + 1] == once[:zero]
     assert states[zero] == MotionState.AT_REST
     assert states[zero + 1].twist.linear_mps > 0.0
+
+
+def test_an_emergency_stop_from_the_smallest_speed_that_there_is_ends_at_once() -> None:
+    slowest = MotionState(Twist2D(5e-324, 0.0))  # its ramp, half as long as an ordinary one, takes no time
+    assert LIMITER.step(slowest, Twist2D.ZERO, DT_S, emergency=True) == MotionState.AT_REST

@@ -190,8 +190,8 @@ def test_of_a_drive_that_the_watchdog_tripped_about_the_driver_tells_more(wrong:
     story.step(also(tripped, WRONG[wrong]))
     assert story.state_machine.finding.cause.value == wrong
     alone = at(ENABLED, RUNNING)
-    alone.step(tripped)
-    assert alone.state_machine.finding.cause.value == "watchdog tripped"
+    assert alone.step(tripped) == QUICK
+    assert alone.told == (STOPPING, "watchdog tripped", True)
 
 
 @pytest.mark.parametrize("wrong", [name for name, _, latched in STOPS if latched])

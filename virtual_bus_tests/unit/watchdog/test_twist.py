@@ -207,6 +207,15 @@ def test_from_a_turn_to_fast_straight_on_slow_wheels_keep_their_distance_until_t
     assert wheels.speeds == (1.0, 1.0)
 
 
+def test_wheels_that_brake_faster_than_they_start_are_elsewhere_at_a_new_order_and_that_is_allowed() -> None:
+    """The right wheel turns round: down with 2 m/s² and up with 0.5 m/s². With 0.5 m/s² both ways it would be
+    elsewhere when the next order comes, and so would the way to it."""
+    base, wheels = straight(0.0, deceleration_mps2=2.0, twist_tolerance_mps=0.02), SlowWheels(0.5, 2.0)
+    for ordered in ((-1.0, 1.0), (0.5, 0.0), (1.0, 1.0)):
+        for _ in range(128):
+            assert base.cycle(ordered, wheels.follow(ordered, 1.0 / HZ)) == ""
+
+
 def test_a_base_that_turns_on_when_wheels_on_the_slowest_ramp_are_there_trips() -> None:
     base = straight(0.0, twist_s=0.05)
     for _ in range(64):
