@@ -88,6 +88,10 @@ teeth: $(VENV)/ready ## takes one safeguard out after the other; the campaign ha
 hazard-cases: $(WORLD_READY) ## the stated times of hazards on ROBOTS=20 drawn robots, straight on, on curves and in place; FIRST=20 other ones, ONLY=force some
 	PYTHONPATH=$(WORLD) python -m campaign.hazard_cases $(if $(ROBOTS),--robots $(ROBOTS)) $(if $(FIRST),--first $(FIRST)) $(if $(ONLY),--only $(ONLY))
 
+.PHONY: worst
+worst: $(WORLD_READY) ## the worst speed, turn and load of failures that hide below a threshold: docs/stop_times.md; ONLY=encoder prints some
+	PYTHONPATH=$(WORLD) python -m campaign.worst $(if $(ONLY),--only '$(ONLY)',--write docs/stop_times.md)
+
 .PHONY: stops
 stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some
 	PYTHONPATH=$(WORLD) python -m campaign.stops --write docs/stop_times.md --only '$(ONLY)'

@@ -1,0 +1,200 @@
+"""`python -m campaign.worst`: the worst speed, turn, load and moment of each failure, searched for in virtual time.
+
+docs/stop_times.md has each failure at one speed. The worst case of a failure often lies just below a threshold of what
+detects it, at a speed that no table has. A coarse grid over all speeds and turns, then a compass search from its worst.
+Exit code 1: a base did not stop.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import multiprocessing
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from canbase_campaign.cruise import Cruise, Run
+from canbase_campaign.robots import DrawnRobot, campaign_robot
+from canbase_campaign.twins import JOYSTICK, TWINS, Twin
+from canbase_config.stopping import max_wheel_mps
+from canbase_sim.plant.base import PlantParameters
+from support.marked_page import rewritten
+
+COMMAND: Final = "make worst"
+SEARCHED: Final = (
+    "encoder: lost",
+    "encoder: frozen",
+    "motor_driver: repeats",
+)
+"""The failures that are searched, by the begin of their name: those whose time depends on a threshold of speed."""
+LINEAR, TURN, LOADS = (0.0, 0.15, 0.3, 0.6, 1.0), (-1.0, -0.5, 0.0, 0.5, 1.0), (1.0, 2.0)
+"""The grid: shares of both limits, and multiples of the mass of the empty robot."""
+STEP, LEAST_STEP = 0.125, 1.0 / 64.0
+"""Of the compass search, in shares of the limits."""
+STARTS = 2
+"""One hill of several need not be the highest."""
+SEEDS = 2
+"""Moments and wheels of each point."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Where a failure begins: shares of limits.linear_mps and limits.angular_radps, and the load."""
+
+    linear: float
+    turn: float
+    load: float = 1.0
+
+    @property
+    def is_possible(self) -> bool:
+        """Within the limits, moving, and no wheel faster than the driver lets it be."""
+        robot = campaign_robot()
+        if not (0.0 <= self.linear <= 1.0 and -1.0 <= self.turn <= 1.0 and (self.linear or self.turn)):
+            return False
+        return self.wheel_mps <= max_wheel_mps(robot) * (1.0 + 1e-9)
+
+    @property
+    def wheel_mps(self) -> float:
+        """Of the faster wheel's rim."""
+        robot = campaign_robot()
+        turning_mps = abs(self.turn) * robot.limits.angular_radps * robot.base.track_m / 2.0
+        return self.linear * robot.limits.linear_mps + turning_mps
+
+    def __str__(self) -> str:
+        limits = campaign_robot().limits
+        load = "" if self.load == 1.0 else f", load {self.load:g} ×"
+        return f"{self.linear * limits.linear_mps:.2f} m/s, {self.turn * limits.angular_radps:+.2f} rad/s{load}"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The greatest value, and where."""
+
+    value: float
+    point: Point
+
+
+def grid() -> list[Point]:
+    """The coarse one, of what is possible."""
+    points = (Point(linear, turn, load) for load in LOADS for linear in LINEAR for turn in TURN)
+    return [point for point in points if point.is_possible]
+
+
+def worst(value: Callable[[Point], float], start: Iterable[Point]) -> Found:
+    """The greatest `value` that a compass search finds, from each of the STARTS worst points of `start`."""
+    ordered = sorted((Found(value(point), point) for point in start), key=lambda found: found.value, reverse=True)
+    return max((_climbed(value, found) for found in ordered[:STARTS]), key=lambda found: found.value)
+
+
+def _climbed(value: Callable[[Point], float], best: Found) -> Found:
+    step = STEP
+    while step >= LEAST_STEP:
+        near = max((Found(value(point), point) for point in _around(best.point, step)), key=lambda found: found.value)
+        if near.value > best.value:
+            best = near
+        else:
+            step /= 2.0
+    return best
+
+
+def _around(point: Point, step: float) -> Iterator[Point]:
+    for linear, turn in ((step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)):
+        other = replace(point, linear=point.linear + linear, turn=point.turn + turn)
+        yield other if other.is_possible else point
+
+
+@cache
+def _cruise(point: Point) -> Cruise:
+    robot = campaign_robot()
+    drawn = DrawnRobot(0, robot, PlantParameters(payload_factor=point.load))
+    limits = robot.limits
+    return Cruise(JOYSTICK, point.linear * limits.linear_mps, drawn, point.turn * limits.angular_radps)
+
+
+@cache
+def runs(twin: Twin, point: Point) -> tuple[Run, ...]:
+    """Of `SEEDS` moments and wheels."""
+    return tuple(_cruise(point).fork(twin, seed) for seed in range(SEEDS))
+
+
+MEASURES: Final[dict[str, tuple[str, Callable[[Run], float]]]] = {
+    "longest time": ("{:.2f} s", lambda run: run.time_s),
+    "longest distance": ("{:.0f} mm", lambda run: run.distance_m * 1000.0),
+    "fastest wheel": ("{:.2f} m/s", lambda run: run.peak_mps),
+}
+
+
+def searched(twin: Twin) -> dict[str, Found]:
+    """The worst of each measure."""
+
+    visited: dict[Point, tuple[Run, ...]] = {}
+
+    def value_of(measure: Callable[[Run], float]) -> Callable[[Point], float]:
+        def value(point: Point) -> float:
+            visited[point] = runs(twin, point)
+            return max(measure(run) for run in visited[point])
+
+        return value
+
+    for _, measure in MEASURES.values():
+        worst(value_of(measure), grid())
+    return {name: _greatest(visited, measure) for name, (_, measure) in MEASURES.items()}
+
+
+def _greatest(visited: dict[Point, tuple[Run, ...]], measure: Callable[[Run], float]) -> Found:
+    """Of all points: the search for one measure may meet the worst of another."""
+    return max(
+        (Found(max(measure(run) for run in each), point) for point, each in visited.items()),
+        key=lambda found: found.value,
+    )
+
+
+def twins(only: str) -> list[Twin]:
+    """The failures that are searched, with `only` in their name."""
+    named = ((f"{twin.what}: {twin.how}", replace(twin, by=JOYSTICK)) for twin in TWINS)
+    return [twin for name, twin in named if name.startswith(SEARCHED) and only in name]
+
+
+def _searched(name: str) -> dict[str, Found]:
+    (twin,) = twins(name)
+    return searched(twin)
+
+
+def table(rows: dict[str, dict[str, Found]]) -> str:
+    """For the page."""
+    lines = [f"| failure | {' | '.join(MEASURES)} |", f"|---|{'---|' * len(MEASURES)}"]
+    for name, row in rows.items():
+        cells = (f"{MEASURES[key][0].format(found.value)} at {found.point}" for key, found in row.items())
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Search; with --write put the table into a page, between its marks."""
+    parser = argparse.ArgumentParser(prog="campaign.worst", description=__doc__)
+    parser.add_argument("--only", default="", help="failures with this in their name")
+    parser.add_argument("--write", type=Path, help="the page; not with --only")
+    given = parser.parse_args()
+    if given.only and given.write:
+        parser.error("a page has all failures")
+    rows: dict[str, dict[str, Found]] = {}
+    out = Console(soft_wrap=True, highlight=False, markup=False)
+    names = [f"{twin.what}: {twin.how}" for twin in twins(given.only)]
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        for name, row in zip(names, pool.imap(_searched, names), strict=True):
+            rows[name] = row
+            out.print(table(rows).splitlines()[-1])
+    if given.write:
+        page = given.write.read_text(encoding="utf-8")
+        given.write.write_text(rewritten(page, COMMAND, table(rows)), encoding="utf-8")
+    return 0 if all(math.isfinite(found.value) for row in rows.values() for found in row.values()) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
