@@ -35,6 +35,7 @@ from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.preconditions import commanding_program, is_moving, state_reason
 from canbase_action_server.state_topics import STATE_TOPICS, States
 from canbase_config.robot import Robot
+from canbase_runtime.received import NEVER, Received
 
 WAITING_FEEDBACK_HZ = 1.0
 """Like the slowest `action.feedback_hz`; a hundred goals may wait."""
@@ -78,10 +79,8 @@ class Admitted:
     key: str
     request: Request
     admitted: float
-    heard: float
-    """When its client gave the last sign of life; until the first one, when it was admitted."""
-    alive: bool = False
-    """Its client has given one since then: it knows that the goal was accepted."""
+    lease: Received[bool] = NEVER
+    """The last sign of life of its client; the first one says that it knows that the goal was accepted."""
     canceled: bool = False
     preempted: bool = False
     invalid: str | None = None
@@ -136,7 +135,7 @@ class GoalQueue:
         if self._robot.action.goal_policy == "preempt" and not reported:
             for goal in self._goals():
                 goal.preempted = True
-        self._waiting.append(Admitted(key, request, now_s, now_s, invalid=invalid))
+        self._waiting.append(Admitted(key, request, now_s, invalid=invalid))
 
     def cancel(self, key: str) -> bool:
         """A client wants the goal to end. False: no such goal runs or waits."""
@@ -149,7 +148,7 @@ class GoalQueue:
         """The client of this goal lives. Nothing happens when no such goal runs or waits."""
         for goal in self._goals():
             if goal.key == key:
-                goal.heard, goal.alive = now_s, True
+                goal.lease = Received(True, now_s)
 
     def tick(self, inputs: Inputs, now_s: float) -> Cycle:
         """One control cycle."""
@@ -190,8 +189,8 @@ class GoalQueue:
         return None
 
     def _client_lost(self, goal: Admitted, now_s: float) -> bool:
-        action = self._robot.action
-        return action.require_client_lease and now_s - goal.heard > action.client_lease_s
+        action, silent_s = self._robot.action, min(goal.lease.age_s(now_s), now_s - goal.admitted)
+        return action.require_client_lease and silent_s > action.client_lease_s
 
     def _drop(self, inputs: Inputs, now_s: float) -> tuple[End, ...]:
         """The ends of those that shall not wait any longer."""
@@ -222,7 +221,7 @@ class GoalQueue:
         if self._owner.busy or not self._waiting:
             return None
         goal = self._waiting[0]
-        if self._robot.action.require_client_lease and not goal.alive:
+        if self._robot.action.require_client_lease and goal.lease.never:
             return None
         if self._waits_for_release(goal, inputs, now_s):
             return None

@@ -5,7 +5,6 @@ Rule. What is missing counts as the worst that it could report: the goal ends, t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -34,9 +33,9 @@ class StateTopic:
         received, timeout_s = self.received(inputs), self.timeout_s(robot)
         if received.within(timeout_s, now_s) is not None:
             return None
-        age_s = received.age_s(now_s)
-        if age_s == math.inf:
+        if received.never:
             return f"nothing received on {self.topic} yet; is {self.node} running?"
+        age_s = received.age_s(now_s)
         return f"no message on {self.topic} for {age_s:.2f} s (timeout {timeout_s:.4g} s); is {self.node} running?"
 
 

@@ -25,6 +25,11 @@ class Received(Generic[T]):
         """Time since it was received [s]; infinite when nothing was received."""
         return now_s - self.received_at_s
 
+    @property
+    def never(self) -> bool:
+        """Nothing was received yet."""
+        return self.received_at_s == -math.inf
+
 
 NEVER: Final[Received[Any]] = Received(None, -math.inf)
 """Nothing was received yet."""

@@ -7,6 +7,7 @@ its cycles from the start again was restarted: that is not ready either, also wh
 from __future__ import annotations
 
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import NEVER, Received
 
 STATUS_TIMEOUT_S = 0.5
 STATUS_PERIODS = 2.5
@@ -24,17 +25,19 @@ class BaseReady:
 
     def __init__(self, timeout_s: float = STATUS_TIMEOUT_S) -> None:
         self._timeout_s = timeout_s
-        self.state = DriverState.OFFLINE
-        """In the last motor_driver/status."""
-        self._at_s: float | None = None
+        self._status: Received[DriverState] = NEVER
         self._cycles = 0
         self._estop_free = False
 
     def on_driver(self, state: DriverState, cycles: int, received: float) -> bool:
         """Takes a motor_driver/status: its state and cycle counter. True: the driver was restarted."""
-        restarted = self._at_s is not None and cycles < self._cycles
-        self.state, self._cycles, self._at_s = state, cycles, received
+        restarted = cycles < self._cycles
+        self._status, self._cycles = Received(state, received), cycles
         return restarted
+
+    def state(self, now_s: float) -> DriverState:
+        """Of the last motor_driver/status; offline at `now_s` [s, monotonic] when that is too old, or never came."""
+        return self._status.within(self._timeout_s, now_s) or DriverState.OFFLINE
 
     def on_estop(self, free: bool) -> None:
         """Takes what the safety filter knows of the emergency stop. False: it holds, or waits for a reset or a zero."""
@@ -42,10 +45,11 @@ class BaseReady:
 
     def problem(self, now_s: float) -> str:
         """Why the base cannot move at `now_s` [s, monotonic]; empty: it can."""
-        if self._at_s is None:
+        if self._status.never:
             return "nothing received on motor_driver/status yet"
-        if now_s - self._at_s > self._timeout_s:
+        state = self._status.within(self._timeout_s, now_s)
+        if state is None:
             return "no recent message on motor_driver/status"
-        if self.state is not DriverState.ENABLED:
-            return f"motor_driver is {self.state.name}"
+        if state is not DriverState.ENABLED:
+            return f"motor_driver is {state.name}"
         return "" if self._estop_free else ESTOP_HOLDS

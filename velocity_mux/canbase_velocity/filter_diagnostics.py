@@ -6,6 +6,8 @@ report is an error, also while nothing is ordered.
 
 from __future__ import annotations
 
+import math
+
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
@@ -92,7 +94,7 @@ _DONE = {
 
 def _scanner(scan: ScanState) -> str:
     """One scanner in words; `not scan.is_fresh` without a problem is age alone."""
-    age = "no scan yet" if scan.age_s is None else f"last scan {scan.age_s:.2f} s ago"
+    age = "no scan yet" if scan.age_s == math.inf else f"last scan {scan.age_s:.2f} s ago"
     usable = "" if scan.usable_share is None else f", {scan.usable_share:.0%} of its beams usable"
     why = scan.problem or scan.why_dropped
     return f"{age}{usable}, {scan.dropped} dropped{f' ({why})' if why else ''}"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from canbase_config.safety import Scan as ScanConfig
 from canbase_runtime.latch_record import Found, Record
+from canbase_runtime.received import NEVER, Received
 from canbase_runtime.stop_cause import StopCause
-from canbase_velocity.clearance import FREE, NOWHERE, Clearances, Field, Points, ScanReader, clearances
+from canbase_velocity.clearance import NOWHERE, Clearances, Field, Points, ScanReader, clearances
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.estop import Estop, EstopEvent, EstopState
@@ -40,6 +41,16 @@ LONGEST_SINCE_S = 0.1
 """Orders after a longer gap may grow as far as after this one [s]."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What one scan shows, as far as it can matter. `field` None: it looks everywhere."""
+
+    points: Floats
+    field: Field | None
+    clearances: Clearances
+    measured_from_s: float
+
+
 class _Scanner:
     """One scanner: its newest scan, reduced to what can matter."""
 
@@ -52,11 +63,7 @@ class _Scanner:
         self.sole = SolePublisher()
         self._delay = Delay(config.same_clock)
         self._reach_m = geometry.reach_m(config.timeout_s)
-        self.at_s: float | None = None
-        self.field: Field | None = None
-        self.points: Floats = NOWHERE
-        self.clearances = FREE
-        self.measured_from_s = -math.inf
+        self._seen: Received[_Seen] = NEVER
         self._problem = self._why_dropped = ""
         self._cause = StopCause.SCAN_STALE
         self._dropped = 0
@@ -105,12 +112,12 @@ class _Scanner:
     def take(self, points: Points, field: Field | None, scan_time_s: float, now_s: float) -> None:
         """A scan with readings; its first reading was taken `scan_time_s` before."""
         limits = self._geometry.limits
-        since_s = self.config.timeout_s if self.at_s is None else min(now_s - self.at_s, self.config.timeout_s)
+        since_s = min(self._seen.age_s(now_s), self.config.timeout_s)
         genuine = self._glitches.genuine(points, limits.linear_mps * since_s, limits.angular_radps * since_s)
-        self.clearances = clearances(genuine, self._geometry.box)
-        self.points = genuine[self._geometry.box.distances_m(genuine) <= self._reach_m]
-        self.field, self.at_s, self._problem, self._why_dropped = field, now_s, "", ""
-        self.measured_from_s = now_s - min(max(scan_time_s, 0.0), self.config.timeout_s + self.config.frozen_s)
+        near = genuine[self._geometry.box.distances_m(genuine) <= self._reach_m]
+        from_s = now_s - min(max(scan_time_s, 0.0), self.config.timeout_s + self.config.frozen_s)
+        self._seen = Received(_Seen(near, field, clearances(genuine, self._geometry.box), from_s), now_s)
+        self._problem = self._why_dropped = ""
 
     def state(self, now_s: float) -> ScanState:
         config = self.config
@@ -118,7 +125,7 @@ class _Scanner:
             config.topic,
             config.required,
             config.timeout_s,
-            _age_s(self.at_s, now_s),
+            self._seen.age_s(now_s),
             self._problem,
             self._cause,
             self._dropped,
@@ -127,6 +134,10 @@ class _Scanner:
             config.same_clock or not config.noisy,
         )
 
+    def seen(self, now_s: float) -> _Seen | None:
+        """What its last scan shows; None: that does not count, or there is none."""
+        return self._seen.within(self.config.timeout_s, now_s) if self.state(now_s).is_fresh else None
+
 
 class SafetyFilter:
     """Keeps the newest of each input. Starts with nothing received: that is a stop for everything required."""
@@ -134,12 +145,11 @@ class SafetyFilter:
     def __init__(self, config: FilterConfig, found: Found | None = None) -> None:
         """`found`: the record of the emergency stop at the start; None: no record is kept, for virtual time alone."""
         self._config = config
-        self._command = ZERO
-        self._command_at_s: float | None = None
+        self._command: Received[Twist] = NEVER
         self._scanners = {scan.topic: _Scanner(scan, config.geometry) for scan in config.safety.scans}
         self._estop = Estop(config.safety.estop.latched, found)
-        self._pressed = self._estop.state is EstopState.HELD
-        self._estop_at_s: float | None = None
+        self._held_at_start = self._estop.state is EstopState.HELD
+        self._button: Received[bool] = NEVER
         self._estop_unheard = ""
         self.estop_crowd = ""
         """Why a release of the emergency stop cannot be seen; empty: it can."""
@@ -182,7 +192,7 @@ class SafetyFilter:
 
     def on_command(self, twist: Twist, now_s: float) -> None:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
-        self._command, self._command_at_s = twist, now_s
+        self._command = Received(twist, now_s)
 
     def on_points(
         self, topic: str, points: Points, field: Field | None, now_s: float, scan_time_s: float = 0.0
@@ -208,7 +218,7 @@ class SafetyFilter:
 
     def on_estop(self, pressed: bool, now_s: float) -> None:
         """Takes a message of the emergency stop: true = stop."""
-        self._pressed, self._estop_at_s = pressed, now_s
+        self._button = Received(pressed, now_s)
         if pressed:
             self._estop.happens(EstopEvent.PRESS)
 
@@ -227,8 +237,8 @@ class SafetyFilter:
         self._advance_estop(now_s)
         inputs = self.inputs(now_s)
         if self._estop.state is EstopState.HELD:
-            held = "pressed" if self._pressed else self._estop_unheard or self.estop_crowd or "not published"
-            if self._pressed and self._estop_at_s is None:
+            held = "pressed" if inputs.pressed else self._estop_unheard or self.estop_crowd or "not published"
+            if inputs.pressed and self._button.never:
                 held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
         if self._estop.state is EstopState.FREE and not moving:
@@ -246,16 +256,16 @@ class SafetyFilter:
         scans = tuple(scanner.state(now_s) for scanner in self._scanners.values())
         pose = self._motion.advance(now_s)
         return Inputs(
-            command=self._command,
-            command_age_s=_age_s(self._command_at_s, now_s),
+            command=self._command.within(math.inf, now_s) or ZERO,
+            command_age_s=self._command.age_s(now_s),
             scans=scans,
             sight=self._sight(pose, now_s),
             moving=self._motion.moving,
             previous=self._previous,
             since_s=min(max(now_s - self._previous_at_s, 0.0), LONGEST_SINCE_S),
             estop=self._estop.state,
-            pressed=self._pressed,
-            estop_age_s=_age_s(self._estop_at_s, now_s),
+            pressed=self._pressed(now_s),
+            estop_age_s=self._button.age_s(now_s),
             estop_before=self._estop.before_the_start,
             estop_crowd=self._estop_unheard or self.estop_crowd,
             estop_unarmed=self._estop.unarmed,
@@ -266,7 +276,7 @@ class SafetyFilter:
 
     def clearances(self, now_s: float) -> Clearances | None:
         """The free way straight ahead and behind, by all fresh scans; None without any."""
-        fresh = [scanner.clearances for scanner in self._fresh(now_s)]
+        fresh = [seen.clearances for _, seen in self._fresh(now_s)]
         if not fresh:
             return None
         return Clearances(min(each.ahead_m for each in fresh), min(each.behind_m for each in fresh))
@@ -298,40 +308,40 @@ class SafetyFilter:
         self._braking_hard = decision.emergency
         return decision
 
-    def _fresh(self, now_s: float) -> list[_Scanner]:
-        return [scanner for scanner in self._scanners.values() if scanner.state(now_s).is_fresh]
+    def _fresh(self, now_s: float) -> list[tuple[_Scanner, _Seen]]:
+        every = ((scanner, scanner.seen(now_s)) for scanner in self._scanners.values())
+        return [(scanner, seen) for scanner, seen in every if seen is not None]
 
     def _sight(self, pose: Pose, now_s: float) -> Sight:
         """Each place as it was scanned and as the base must see it by now, where that differs."""
         fresh = self._fresh(now_s)
         parts = [NOWHERE]
-        for scanner in fresh:
-            there = self._motion.pose_at(scanner.measured_from_s - self._config.safety.reaction_s)
-            parts.append(scanner.points)
-            if not pose.is_at(there) and scanner.points.shape[0] > 0:
-                parts.append(pose.from_here(scanner.points, there))
-        known = (scanner.field for scanner in fresh if scanner.state(now_s).knows_age)
+        for _, seen in fresh:
+            there = self._motion.pose_at(seen.measured_from_s - self._config.safety.reaction_s)
+            parts.append(seen.points)
+            if not pose.is_at(there) and seen.points.shape[0] > 0:
+                parts.append(pose.from_here(seen.points, there))
+        known = (seen.field for scanner, seen in fresh if scanner.state(now_s).knows_age)
         fields = tuple(field for field in known if field is not None)
-        sees_all = any(scanner.field is None for scanner in fresh)
+        sees_all = any(seen.field is None for _, seen in fresh)
         points = np.concatenate(parts) if len(parts) > 2 else parts[-1]
-        ages_s = (max(now_s - scanner.measured_from_s, scanner.config.timeout_s) for scanner in fresh)
+        ages_s = (max(now_s - seen.measured_from_s, scanner.config.timeout_s) for scanner, seen in fresh)
         return Sight(points, () if sees_all else fields, max(ages_s, default=0.0))
 
     def _advance_estop(self, now_s: float) -> None:
         """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""
         settings = self._config.safety
-        age_s, command_age_s = _age_s(self._estop_at_s, now_s), _age_s(self._command_at_s, now_s)
-        silent = age_s is None or age_s > settings.estop.timeout_s
+        silent = self._button.within(settings.estop.timeout_s, now_s) is None
         if self._estop_unheard or (settings.estop.required and silent):
             self._estop.happens(EstopEvent.SILENCE)
         elif self.estop_crowd:
             return
-        elif not self._pressed and age_s is not None:
+        elif self._button.within(math.inf, now_s) is False:
             self._estop.happens(EstopEvent.RELEASE)
-        fresh = command_age_s is not None and command_age_s <= settings.command_timeout_s
-        if fresh and self._command.is_zero:
+        command = self._command.within(settings.command_timeout_s, now_s)
+        if command is not None and command.is_zero:
             self._estop.happens(EstopEvent.ZERO)
 
-
-def _age_s(at_s: float | None, now_s: float) -> float | None:
-    return None if at_s is None else now_s - at_s
+    def _pressed(self, now_s: float) -> bool:
+        """By the last word of the button, however old: its timeout is looked at beside. Before it, by the record."""
+        return self._held_at_start if self._button.never else bool(self._button.within(math.inf, now_s))

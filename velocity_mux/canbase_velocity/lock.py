@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock
+from canbase_runtime.received import NEVER, Received
 from canbase_runtime.source_standing import LockStanding
 
 
@@ -21,14 +22,14 @@ def crowd(topic: str, nodes: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class LockView:
-    """One lock at one moment. `age_s` is None before its first message; `reason` is empty when it does not hold."""
+    """One lock at one moment. `age_s` is infinite before its first message; `reason` is empty when it does not hold."""
 
     name: str
     topic: str
     priority: int
     standing: LockStanding
     required: bool
-    age_s: float | None
+    age_s: float
     timeout_s: float
     reason: str
 
@@ -44,8 +45,7 @@ class Lock:
     def __init__(self, name: str, config: MuxLock) -> None:
         self.name = name
         self.config = config
-        self._locked = False
-        self._at_s = -math.inf
+        self._word: Received[bool] = NEVER
         self._crowd = ""
 
     def published_by(self, nodes: Sequence[str]) -> None:
@@ -54,19 +54,19 @@ class Lock:
 
     def hear(self, locked: bool, now_s: float) -> None:
         """Takes its word: true = locked."""
-        self._locked, self._at_s = locked, now_s
+        self._word = Received(locked, now_s)
 
     def standing(self, now_s: float) -> LockStanding:
         """Whether it holds at time `now_s` [s, monotonic], and for what."""
-        if self._locked:
+        if self._word.within(math.inf, now_s):
             return LockStanding.LOCKED
         if self._crowd:
             return LockStanding.SHARED
         if not self.config.required:
             return LockStanding.FREE
-        if self._at_s == -math.inf:
+        if self._word.never:
             return LockStanding.NEVER_RECEIVED
-        return LockStanding.FREE if now_s - self._at_s <= self.config.timeout_s else LockStanding.SILENT
+        return LockStanding.SILENT if self._word.within(self.config.timeout_s, now_s) is None else LockStanding.FREE
 
     def holds(self, now_s: float) -> bool:
         """It holds back the sources below it at time `now_s` [s, monotonic]."""
@@ -77,7 +77,7 @@ class Lock:
         standing = self.standing(now_s)
         if standing is LockStanding.FREE:
             return ""
-        age_s, timeout_s = now_s - self._at_s, self.config.timeout_s
+        age_s, timeout_s = self._word.age_s(now_s), self.config.timeout_s
         return {
             LockStanding.LOCKED: "holds",
             LockStanding.SHARED: f"has {self._crowd}",
@@ -93,7 +93,7 @@ class Lock:
             priority=self.config.priority,
             standing=self.standing(now_s),
             required=self.config.required,
-            age_s=None if self._at_s == -math.inf else now_s - self._at_s,
+            age_s=self._word.age_s(now_s),
             timeout_s=self.config.timeout_s,
             reason=self.reason(now_s),
         )

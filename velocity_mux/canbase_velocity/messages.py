@@ -79,8 +79,8 @@ def safety_state(decision: Decision, inputs: Inputs, free: Clearances | None, st
         emergency=decision.emergency,
         clearance_ahead_m=free.ahead_m if free else NAN,
         clearance_behind_m=free.behind_m if free else NAN,
-        command_age_s=_or_nan(inputs.command_age_s),
-        scan_age_s=_or_nan(oldest_scan_s(inputs.scans)),
+        command_age_s=or_nan(inputs.command_age_s),
+        scan_age_s=or_nan(oldest_scan_s(inputs.scans)),
         ordered_linear_mps=decision.twist.linear_mps,
         ordered_angular_radps=decision.twist.angular_radps,
         scanners=[_scanner_state(scan) for scan in inputs.scans],
@@ -92,19 +92,20 @@ def _scanner_state(scan: ScanState) -> ScannerState:
         topic=scan.topic,
         required=scan.required,
         fresh=scan.is_fresh,
-        age_s=_or_nan(scan.age_s),
-        usable_share=_or_nan(scan.usable_share),
+        age_s=or_nan(scan.age_s),
+        usable_share=or_nan(scan.usable_share),
         dropped=scan.dropped,
         problem=scan.problem or scan.why_dropped,
     )
 
 
 def oldest_scan_s(scans: tuple[ScanState, ...]) -> float | None:
-    """Age of the oldest scan among those that are required, or among all where none is [s]; None: one is missing."""
+    """Age of the oldest scan among those that are required, or among all where none is [s], infinite where one is
+    missing; None: there is no scanner."""
     counting = [scan.age_s for scan in scans if scan.required] or [scan.age_s for scan in scans]
-    known = [age_s for age_s in counting if age_s is not None]
-    return max(known) if len(known) == len(counting) else None
+    return max(counting, default=None)
 
 
-def _or_nan(value: float | None) -> float:
-    return NAN if value is None else value
+def or_nan(value: float | None) -> float:
+    """What a message has for a value that is not known, or for the age of what was never received."""
+    return NAN if value is None or math.isinf(value) else value

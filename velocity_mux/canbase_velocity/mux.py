@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.received import NEVER, Received
 from canbase_runtime.source_standing import IGNORED, SourceStanding
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady
 from canbase_velocity.delay import Delay, Sent
@@ -38,8 +39,9 @@ from canbase_velocity.unexpected_publishers import Foreign
 
 @dataclass(frozen=True, slots=True)
 class SourceView:
-    """One source at one moment. `age_s` is None before its first valid command, `delay_s` while nothing is known of it.
+    """One source at one moment.
 
+    `age_s` is infinite before its first valid command, `delay_s` None while nothing is known of it.
     `reason`: why it is not followed; empty when it is. `locked`: a lock holds it back, also without a recent message.
     """
 
@@ -47,7 +49,7 @@ class SourceView:
     topic: str
     priority: int
     standing: SourceStanding
-    age_s: float | None
+    age_s: float
     timeout_s: float
     received: int
     refused: int
@@ -106,8 +108,7 @@ class _Source:
     def __init__(self, name: str, config: MuxSource) -> None:
         self.name = name
         self.config = config
-        self.twist = ZERO
-        self.at_s: float | None = None
+        self.command: Received[Twist] = NEVER
         self.received = 0
         self.refused = 0
         self.refusal = ""
@@ -124,7 +125,7 @@ class _Source:
         """A finite command."""
         self.received += 1
         self.refusal = ""
-        self.twist, self.at_s = twist, received
+        self.command = Received(twist, received)
         self.delay_s = None if sent is None else self._delay.take(sent)
         if sent is not None and self._delay.set_back:
             self.arming.disarm("a command arrived after a newer one, or the clock of its sender was set back")
@@ -154,14 +155,13 @@ class _Source:
         """Its last command was on the way for longer than it may hold, or is stamped in the future."""
         return bool(self.why_late)
 
-    def age_s(self, now_s: float) -> float | None:
-        return None if self.at_s is None else now_s - self.at_s
+    def fresh(self, now_s: float) -> Twist | None:
+        """Its command; None: too old, or none. Also one that was late: somebody publishes there."""
+        late_s = 0.0 if self.is_late else max(0.0, self.delay_s or 0.0)
+        return self.command.within(self.config.timeout_s - late_s, now_s)
 
     def is_fresh(self, now_s: float) -> bool:
-        """Also of commands that were late: somebody publishes there."""
-        age_s = self.age_s(now_s)
-        late_s = 0.0 if self.is_late else max(0.0, self.delay_s or 0.0)
-        return age_s is not None and age_s + late_s <= self.config.timeout_s
+        return self.fresh(now_s) is not None
 
     def standing(self) -> tuple[SourceStanding, str]:
         """Of the one that has the base."""
@@ -180,7 +180,7 @@ class _Source:
             topic=config.topic,
             priority=config.priority,
             standing=standing,
-            age_s=self.age_s(now_s),
+            age_s=self.command.age_s(now_s),
             timeout_s=config.timeout_s,
             received=self.received,
             refused=self.refused,
@@ -243,10 +243,9 @@ class Mux:
         source.refused += 1
         source.refusal = why
 
-    @property
-    def driver_state(self) -> DriverState:
-        """Of the last motor_driver/status."""
-        return self._base.state
+    def driver_state(self, now_s: float) -> DriverState:
+        """Of the last motor_driver/status; offline at `now_s` [s, monotonic] when that is too old, or never came."""
+        return self._base.state(now_s)
 
     def on_driver(self, state: DriverState, cycles: int, received: float) -> None:
         """Takes a motor_driver/status: its state and its counter of cycles."""
@@ -289,12 +288,13 @@ class Mux:
         if active is None:
             return MuxDecision(None, ZERO, views, *self._others(now_s))
         followed = active.standing()[0] is SourceStanding.FOLLOWED
-        return MuxDecision(active.name, active.twist if followed else ZERO, views, *self._others(now_s))
+        twist = active.fresh(now_s) if followed else None
+        return MuxDecision(active.name, twist or ZERO, views, *self._others(now_s))
 
     def moving(self, now_s: float) -> tuple[str, ...]:
         """Fresh sources that do not order zero, also without the base: a reset is refused while there are any."""
-        moving = (source for source in self._sources.values() if source.is_fresh(now_s) and not source.twist.is_zero)
-        return tuple(source.name for source in moving)
+        fresh = ((source.name, source.fresh(now_s)) for source in self._sources.values())
+        return tuple(name for name, twist in fresh if twist is not None and not twist.is_zero)
 
     def shutdown(self, now_s: float) -> MuxDecision:
         """The order while the process ends: zero, whatever the sources order."""
@@ -329,13 +329,13 @@ class Mux:
         return ""
 
     def _view(self, source: _Source, active: _Source | None, held: str, now_s: float) -> SourceView:
-        age_s = source.age_s(now_s)
+        age_s = source.command.age_s(now_s)
         refusal = f"; its newest message was refused: {source.refusal}" if source.refusal else ""
         if source is active:
             return source.view(now_s, *source.standing())
         if held:
             return source.view(now_s, SourceStanding.LOCKED, held, locked=True)
-        if age_s is None:
+        if source.command.never:
             return source.view(now_s, SourceStanding.NEVER_RECEIVED, f"never received{refusal}")
         if active is None or not source.is_fresh(now_s):
             reason = f"no message for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s){refusal}"

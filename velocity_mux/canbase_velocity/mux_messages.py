@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from builtin_interfaces.msg import Time
 from canbase.msg import ForeignPublisher, MuxLock, MuxSource, MuxState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -11,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from canbase_config.diagnostics import VELOCITY_MUX, entry_name
 from canbase_runtime.source_standing import IGNORED
 from canbase_velocity.lock import LockView
+from canbase_velocity.messages import or_nan
 from canbase_velocity.mux import MuxDecision, SourceView
 from canbase_velocity.unexpected_publishers import Foreign
 
@@ -58,9 +57,9 @@ def _source(source: SourceView, active: str | None) -> MuxSource:
         active=source.name == active,
         armed=source.armed,
         locked=source.locked,
-        age_s=_or_nan(source.age_s),
+        age_s=or_nan(source.age_s),
         timeout_s=source.timeout_s,
-        delay_s=_or_nan(source.delay_s),
+        delay_s=or_nan(source.delay_s),
         received=source.received,
         refused=source.refused,
         standing=source.standing,
@@ -75,7 +74,7 @@ def _lock(lock: LockView) -> MuxLock:
         priority=lock.priority,
         holds=lock.holds,
         required=lock.required,
-        age_s=_or_nan(lock.age_s),
+        age_s=or_nan(lock.age_s),
         timeout_s=lock.timeout_s,
         standing=lock.standing,
         reason=lock.reason,
@@ -90,7 +89,3 @@ def _foreign(foreign: Foreign, locks: bool) -> ForeignPublisher:
         problem=foreign.problem,
         locks=locks and foreign.obeyed,
     )
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value

@@ -70,12 +70,12 @@ class FilterConfig:
 
 @dataclass(frozen=True, slots=True)
 class ScanState:
-    """The state of one scanner. `age_s`: of its last scan with readings [s]; None: none yet."""
+    """The state of one scanner. `age_s`: of its last scan with readings [s]; infinite: none yet."""
 
     topic: str
     required: bool
     timeout_s: float
-    age_s: float | None
+    age_s: float
     problem: str = ""
     """Why its scans cannot be used, such as a frame that tf_static does not know; empty: they can."""
     cause: StopCause = StopCause.SCAN_STALE
@@ -93,15 +93,15 @@ class ScanState:
     @property
     def is_fresh(self) -> bool:
         """Its last scan counts."""
-        return not self.problem and _is_fresh(self.age_s, self.timeout_s)
+        return not self.problem and self.age_s <= self.timeout_s
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """What is known when a decision is made. Ages are of local receive times [s]; None: nothing received yet."""
+    """What is known when a decision is made. Ages are of local receive times [s]; infinite: nothing received yet."""
 
     command: Twist
-    command_age_s: float | None
+    command_age_s: float
     scans: tuple[ScanState, ...]
     sight: Sight
     """What the fresh ones of the scans show."""
@@ -114,7 +114,7 @@ class Inputs:
     estop: EstopState
     pressed: bool
     """The state in the last message of the emergency stop."""
-    estop_age_s: float | None
+    estop_age_s: float
     estop_before: str = ""
     """Why the emergency stop holds since the start; empty: it does not."""
     estop_crowd: str = ""
@@ -172,7 +172,7 @@ def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
     if not inputs.pressed:
         detail = _silence(estop.topic, inputs.estop_age_s, estop.timeout_s)
         return stop(StopCause.ESTOP_STALE, detail, f"false on {estop.topic}, then {then}")
-    if inputs.estop_before and inputs.estop_age_s is None:
+    if inputs.estop_before and inputs.estop_age_s == math.inf:
         detail = f"the emergency stop was not seen released yet: {inputs.estop_before}"
         return stop(StopCause.ESTOP, detail, f"false on {estop.topic}, then {then}")
     return stop(StopCause.ESTOP, "the emergency stop is pressed", f"its release, then {then}")
@@ -180,7 +180,7 @@ def _estop(inputs: Inputs, config: FilterConfig) -> Finding | None:
 
 def _command(inputs: Inputs, config: FilterConfig) -> Finding | None:
     timeout_s = config.safety.command_timeout_s
-    if not _is_fresh(inputs.command_age_s, timeout_s):
+    if inputs.command_age_s > timeout_s:
         detail = _silence("cmd_vel_mux", inputs.command_age_s, timeout_s)
         return stop(StopCause.COMMAND_STALE, detail, "commands on cmd_vel_mux")
     if not inputs.command.is_finite:
@@ -256,7 +256,7 @@ def _out_of_range(command: Twist, share: float, sight: Sight, config: FilterConf
 
 def _lost_all(scans: tuple[ScanState, ...]) -> bool:
     """None counts any more, and one did."""
-    return any(scan.age_s is not None for scan in scans) and not any(scan.is_fresh for scan in scans)
+    return any(scan.age_s < math.inf for scan in scans) and not any(scan.is_fresh for scan in scans)
 
 
 def _limit(command: Twist, factor: float, cause: StopCause, clears_on: str) -> Finding:
@@ -359,11 +359,7 @@ def _where(twist: Twist) -> str:
     return way if twist.angular_radps == 0.0 else f"{way} on the arc"
 
 
-def _is_fresh(age_s: float | None, timeout_s: float) -> bool:
-    return age_s is not None and age_s <= timeout_s
-
-
-def _silence(topic: str, age_s: float | None, timeout_s: float) -> str:
-    if age_s is None:
+def _silence(topic: str, age_s: float, timeout_s: float) -> str:
+    if age_s == math.inf:
         return f"nothing received on {topic} yet"
     return f"no message on {topic} for {age_s:.2f} s (timeout {timeout_s:.2f} s)"

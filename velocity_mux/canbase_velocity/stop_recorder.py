@@ -30,7 +30,7 @@ class StopRecorder:
     def look(self, now_s: float) -> None:
         """Keeps the state now and then; hands over what is due."""
         self._inputs.look(self._mux.core, self._safety.core, now_s)
-        due = self._watch.look(self._mux.core.driver_state, self._safety.estop_free, now_s)
+        due = self._watch.look(self._mux.core.driver_state(now_s), self._safety.estop_free, now_s)
         if due is not None:
             self._hand_over(due, time.time() - now_s)
 

@@ -101,7 +101,7 @@ def _driver_forgets() -> None:
 
 def _forget_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
     """Released, the emergency stop is free at once."""
-    self._estop.state = HELD if self._pressed else FREE
+    self._estop.state = HELD if self._pressed(now_s) else FREE
 
 
 def _no_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
@@ -256,7 +256,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:asks_for_watchdog": _brakes_softly_too(
         _put(watchdog_link.WatchdogLink, "view", lambda self, now_s: (WatchdogView.OK, ""))
     ),
-    "driver:command_timeout": _put(command.Command, "is_fresh", lambda self, now_s: self.received_at > 0.0),
+    "driver:command_timeout": _put(command.Command, "_fresh", lambda self, now_s: self._command.within(1e9, now_s)),
     "driver:zero_before_motion": _put(command.Command, "await_zero", lambda self: None),
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
@@ -269,7 +269,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:lock_publishers": _put(lock.Lock, "published_by", lambda self, nodes: None),
     "driver:lets_go": _put(LetGo, "_is_due", lambda self, wheels: False),
-    "mux:timeout": _put(mux._Source, "is_fresh", lambda self, now_s: self.at_s is not None),
+    "mux:timeout": _put(mux._Source, "fresh", lambda self, now_s: self.command.within(1e9, now_s)),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
     "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),

@@ -52,7 +52,7 @@ def config(*, scan: bool = True, estop: bool = True, latched: bool = False, **sa
     return FilterConfig(LIMITS, made, STANDSTILL_MPS, Geometry.of(LIMITS, made, 1.0 / HOLD_S))
 
 
-def scanned(age_s: float | None, *, required: bool = True, problem: str = "") -> tuple[ScanState, ...]:
+def scanned(age_s: float, *, required: bool = True, problem: str = "") -> tuple[ScanState, ...]:
     return (
         ScanState("scan", required, 0.3, age_s, problem, StopCause.SCAN_UNPLACED if problem else StopCause.SCAN_STALE),
     )

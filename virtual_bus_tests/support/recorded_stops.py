@@ -132,7 +132,7 @@ class VelocityBox:
         velocity, now_s = self._world.velocity, self._world.clock.now_s
         if velocity.running:
             self._ring.look(velocity.mux, velocity.filter, now_s)
-            due = self._watch.look(velocity.mux.driver_state, velocity.filter.estop is EstopState.FREE, now_s)
+            due = self._watch.look(velocity.mux.driver_state(now_s), velocity.filter.estop is EstopState.FREE, now_s)
             if due is not None:
                 self._cut(due)
         self._world.clock.after(self.LOOK_S, self._look)

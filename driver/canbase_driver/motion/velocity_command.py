@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from canbase_driver.motion.kinematics import Twist2D
+from canbase_runtime.received import NEVER, Received
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,9 +32,8 @@ class Command:
     def __init__(self, timeout_s: float) -> None:
         """`timeout_s`: a command that is older is none (timeouts.command_s)."""
         self._timeout_s = timeout_s
-        self._twist = Twist2D.ZERO
+        self._command: Received[Twist2D] = NEVER
         self._seen_zero = False
-        self.received_at = -math.inf
         self.refused = 0
         """Commands that were not finite."""
 
@@ -42,7 +42,7 @@ class Command:
         if not twist.is_finite:
             self.refused += 1
             return False
-        self._twist, self.received_at = twist, received_at
+        self._command = Received(twist, received_at)
         self._seen_zero = self._seen_zero or twist == Twist2D.ZERO
         return True
 
@@ -50,22 +50,21 @@ class Command:
         """From now on nothing is followed until a zero has come: the operator must release the joystick once."""
         self._seen_zero = False
 
-    def is_fresh(self, now_s: float) -> bool:
-        """It came within the timeout."""
-        return now_s - self.received_at <= self._timeout_s
-
     def report(self, now_s: float) -> CommandReport:
         """All of it at the time `now_s` [s, monotonic]."""
-        age_s = now_s - self.received_at
-        known_s = age_s if math.isfinite(age_s) else math.nan
-        return CommandReport(age_s=known_s, fresh=self.is_fresh(now_s), refused=self.refused)
+        age_s = math.nan if self._command.never else self._command.age_s(now_s)
+        return CommandReport(age_s=age_s, fresh=self._fresh(now_s) is not None, refused=self.refused)
 
     def motion(self, now_s: float) -> str:
         """A sentence when a fresh command orders motion, followed or not."""
-        if not self.is_fresh(now_s) or self._twist == Twist2D.ZERO:
+        twist = self._fresh(now_s)
+        if twist is None or twist == Twist2D.ZERO:
             return ""
-        return f"cmd_vel orders {self._twist.linear_mps:.3f} m/s, {self._twist.angular_radps:.3f} rad/s"
+        return f"cmd_vel orders {twist.linear_mps:.3f} m/s, {twist.angular_radps:.3f} rad/s"
 
     def target(self, now_s: float) -> Twist2D:
         """What to follow: the command, zero when it is too old or no zero was seen yet."""
-        return self._twist if self._seen_zero and self.is_fresh(now_s) else Twist2D.ZERO
+        return (self._fresh(now_s) if self._seen_zero else None) or Twist2D.ZERO
+
+    def _fresh(self, now_s: float) -> Twist2D | None:
+        return self._command.within(self._timeout_s, now_s)

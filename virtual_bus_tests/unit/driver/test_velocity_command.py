@@ -23,7 +23,7 @@ def command(*twists: Twist2D) -> Command:
 
 def test_before_the_first_command_the_target_is_zero() -> None:
     assert command().target(10.0) == Twist2D.ZERO
-    assert not command().is_fresh(10.0)
+    assert not command().report(10.0).fresh
     assert command().motion(10.0) == ""
 
 
@@ -46,7 +46,7 @@ def test_await_zero_forgets_the_zero_that_was_seen() -> None:
 @pytest.mark.parametrize(("now_s", "fresh"), [(10.0, True), (10.199, True), (10.201, False), (1e9, False)])
 def test_a_command_counts_for_its_timeout(now_s: float, fresh: bool) -> None:
     made = command(Twist2D.ZERO, FORWARD)
-    assert made.is_fresh(now_s) is fresh
+    assert made.report(now_s).fresh is fresh
     assert (made.target(now_s) == FORWARD) is fresh
     assert (made.motion(now_s) == "cmd_vel orders 0.300 m/s, 0.100 rad/s") is fresh
 
@@ -62,7 +62,8 @@ def test_what_is_not_finite_is_refused_counted_and_changes_nothing(bad: float, p
     values = [0.1, 0.1]
     values[place] = bad
     assert not made.take(Twist2D(*values), 10.15)
-    assert (made.refused, made.received_at, made.target(10.1)) == (1, 10.0, FORWARD)
+    assert (made.refused, made.target(10.1)) == (1, FORWARD)
+    assert made.report(10.15).age_s == pytest.approx(0.15)
 
 
 def test_the_worst_lateness_is_that_of_the_last_second() -> None:

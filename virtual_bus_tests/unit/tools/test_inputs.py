@@ -92,3 +92,10 @@ def test_what_is_received_is_read_through_its_age_alone() -> None:
         if "Received" in (text := file.read_text("utf-8")) and pattern.search(text)
     }
     assert inside == {"runtime/canbase_runtime/received.py"}
+
+
+def test_what_has_an_age_limit_has_the_type_that_needs_one() -> None:
+    """Without: what decides nothing, what stays until the next message, requests (receive_time.py)."""
+    aged = [row for row in TABLE["topics"] if not row["age"].startswith(("none", "not while"))]
+    assert {row["type"] for row in aged} == {"Received"}
+    assert len(aged) >= 11

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -57,7 +59,7 @@ def test_a_stop_that_is_right_warns_and_what_does_not_work_is_an_error(
 
 
 def test_a_required_scanner_that_died_is_an_error_also_while_nothing_is_ordered() -> None:
-    for dead in (scanned(0.9), scanned(None), scanned(0.1, problem="tf_static does not know laser")):
+    for dead in (scanned(0.9), scanned(math.inf), scanned(0.1, problem="tf_static does not know laser")):
         assert entry(known=given_that(scans=dead)).level == ERROR
     assert "tf_static does not know laser" in entry(known=given_that(scans=dead)).message
     assert entry(known=given_that(scans=scanned(0.9, required=False))).level == OK

@@ -39,7 +39,7 @@ def test_before_any_command_zero_is_ordered_and_each_source_says_why(mux: Mux) -
     assert decision.active is None
     assert decision.twist == ZERO
     assert reasons(decision) == dict.fromkeys(("joystick", "navigation", "action"), "never received")
-    assert [source.age_s for source in decision.sources] == [None, None, None]
+    assert [source.age_s for source in decision.sources] == [math.inf] * 3
 
 
 def test_sources_are_listed_by_falling_priority_whatever_their_order_in_the_file() -> None:
@@ -211,7 +211,7 @@ def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
 # two nodes publish on one lock: it holds, whatever they say ── one is left, and says that it does not hold
 def test_a_lock_with_two_publishers_holds_and_names_them() -> None:
     mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
-    assert mux.decide(8.0).locks[0].age_s is None
+    assert mux.decide(8.0).locks[0].age_s == math.inf
     mux.on_lock("pause", False, 8.0)
     mux.on_publishers("pause", ["/panel"])
     assert [lock.standing for lock in mux.decide(8.0).locks] == [LockStanding.FREE]

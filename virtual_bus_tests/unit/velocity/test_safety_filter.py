@@ -41,15 +41,15 @@ def test_actions_and_causes_are_those_of_the_message() -> None:
 @pytest.mark.parametrize(
     ("changes", "cause", "words"),
     [
-        ({"command_age_s": None}, StopCause.COMMAND_STALE, "nothing received on cmd_vel_mux yet"),
+        ({"command_age_s": math.inf}, StopCause.COMMAND_STALE, "nothing received on cmd_vel_mux yet"),
         ({"command_age_s": 0.25}, StopCause.COMMAND_STALE, "no message on cmd_vel_mux for 0.25 s (timeout 0.20 s)"),
         ({"command": Twist(NAN, 0.0)}, StopCause.COMMAND_INVALID, "cmd_vel_mux carries"),
         ({"command": Twist(0.0, INF)}, StopCause.COMMAND_INVALID, "cmd_vel_mux carries"),
-        ({"scans": scanned(None)}, StopCause.SCAN_STALE, "nothing received on scan yet"),
+        ({"scans": scanned(math.inf)}, StopCause.SCAN_STALE, "nothing received on scan yet"),
         ({"scans": scanned(0.35)}, StopCause.SCAN_STALE, "no message on scan for 0.35 s (timeout 0.30 s)"),
         ({"scans": scanned(0.0, problem="tf_static is empty")}, StopCause.SCAN_UNPLACED, "scan: tf_static is empty"),
         (HELD | {"pressed": True}, StopCause.ESTOP, "the emergency stop is pressed"),
-        (HELD | {"estop_age_s": None}, StopCause.ESTOP_STALE, "nothing received on estop_state yet"),
+        (HELD | {"estop_age_s": math.inf}, StopCause.ESTOP_STALE, "nothing received on estop_state yet"),
         (HELD | {"estop_age_s": 0.6}, StopCause.ESTOP_STALE, "no message on estop_state for 0.60 s (timeout 0.50 s)"),
         ({"estop": EstopState.AWAITS_ZERO}, StopCause.ESTOP, "has not been zero since"),
         ({"estop": EstopState.AWAITS_RESET}, StopCause.ESTOP, "waits for a reset"),
@@ -78,9 +78,9 @@ def test_an_input_is_fresh_until_exactly_its_timeout(changes: Any, timeout_s: fl
 
 
 def test_what_is_not_required_may_be_silent() -> None:
-    silent = given_that(scans=scanned(None, required=False), estop_age_s=None)
+    silent = given_that(scans=scanned(math.inf, required=False), estop_age_s=math.inf)
     assert decide(silent, config(scan=False, estop=False)).twist == GOOD.command
-    unplaced = given_that(scans=scanned(None, required=False, problem="tf_static is empty"))
+    unplaced = given_that(scans=scanned(math.inf, required=False, problem="tf_static is empty"))
     assert decide(unplaced, config(scan=False)).twist == GOOD.command
 
 
