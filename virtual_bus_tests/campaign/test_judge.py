@@ -127,6 +127,18 @@ def counts_more(world: World) -> None:
     core.snapshot = lambda now_s: scaled(told(now_s), 1.5)  # type: ignore[method-assign]
 
 
+def loses_in_silence(world: World) -> None:
+    """The pose misses what the wheels rolled, and odometry does not count it."""
+    core = world.driver.core
+    shown = core.snapshot
+
+    def silent(now_s: float) -> DriverSnapshot:
+        snapshot = shown(now_s)
+        return replace(snapshot, odometry=replace(snapshot.odometry, pose_resets=0))
+
+    core.snapshot = silent  # type: ignore[method-assign]
+
+
 def forgets_the_second(world: World) -> None:
     """The watchdog's second trip ends by itself."""
     tick = Watchdog.tick
@@ -232,6 +244,8 @@ STORIES = (
     Story("an encoder that was off for a moment, and odometry that is for ever",
           plan(fault("encoder_scaled", 0.1, 0.1, wheel=0, factor=0.5), segments=(stick(0.4, 0.0, 0.5, 3.0),)),
           "odometry", counts_more),
+    Story("a driver that is off the bus in motion, and does not count the distance that its pose misses",
+          plan(fault("bus_problem", 1.5, 0.33), segments=(stick(0.6, 0.0, 0.0, 9.0),)), "odometry", loses_in_silence),
     Story("a watchdog that gets its processor now and then, and looks at nothing",
           plan(fault("driver_dies", 1.0, 4.0), fault("watchdog_starved", 0.9, 4.0, share=0.9), segments=LONG),
           "envelope", None, "watchdog:all", WATCHES_NOTHING),

@@ -92,7 +92,7 @@ EXCUSES = {
     ),
     "unread": Excuse(
         "a driver without a line from a drive cannot know whether that one began to count anew meanwhile: it publishes "
-        "no pose, and goes on from the last one",
+        "no pose, counts the loss in pose_resets, and goes on from the last one",
         math.inf,
     ),
     "unasked": Excuse(

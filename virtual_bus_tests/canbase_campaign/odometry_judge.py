@@ -3,7 +3,8 @@
 From the first one of a driver's life on, in motion too. What the driver says about its own pose counts for nothing: a
 pose that it publishes is one that others follow. A new comparison begins where the truth says that no encoder could
 know: an encoder lied, a second drive answered with the same node id, a drive's counter began anew; or the driver had no
-line from a drive, and published nothing meanwhile: it cannot know whether that drive began to count anew.
+line from a drive, published nothing meanwhile, and counts the loss in `pose_resets`: it cannot know whether that drive
+began to count anew, and whoever follows the pose can know that travel is missing.
 """
 
 from __future__ import annotations
@@ -80,6 +81,8 @@ class OdometryJudge:
         self._beside = False
         """The newest pose needs that row."""
         self._gap_until, self._gap_unread_s = -math.inf, 0.0
+        self._resets, self._says_lost = 0, False
+        """Published beside the poses: how often travel is missing; it grew over the newest gap."""
         self._unread_s = 0.0
         """The base moved for so long while the driver had no line from a drive, since the last pose."""
 
@@ -116,16 +119,19 @@ class OdometryJudge:
         """What is wrong with the pose in this message of odom, or an empty text."""
         driver = self._world.driver
         if driver.core is not self._core:
-            self._core, self._last, self._origins = driver.core, None, None
+            self._core, self._last, self._origins, self._resets = driver.core, None, None, 0
         last_at = self._last[0] if self._last is not None else math.inf
         pose = snapshot.odometry.pose
         place = Place(pose.x_m, pose.y_m, pose.yaw_rad)
         problem = self._difference(place)
         if last_at + self._gap_s < now_s and last_at <= self._missed_at + BOOTS_S:
             self._gap_until, self._gap_unread_s = now_s + SHOWS_S, self._unread_s
-        if now_s <= self._gap_until and (
+        resets_before, self._resets = self._resets, snapshot.odometry.pose_resets
+        if last_at + self._gap_s < now_s:
+            self._says_lost = self._resets > resets_before
+        if now_s <= self._gap_until and self._says_lost and (
             problem or self._heads_elsewhere(place)
-        ):  # it published nothing meanwhile: nobody follows across that
+        ):  # it published nothing meanwhile, and then that travel is missing
             self._ledger.add("odometry", "unread", self._gap_unread_s)
             self._gap_until, problem = -math.inf, self._restart(place)
         self._unread_s = 0.0
