@@ -129,9 +129,8 @@ class OdometryJudge:
         resets_before, self._resets = self._resets, snapshot.odometry.pose_resets
         if last_at + self._gap_s < now_s:
             self._says_lost = self._resets > resets_before
-        if now_s <= self._gap_until and self._says_lost and (
-            problem or self._heads_elsewhere(place)
-        ):  # it published nothing meanwhile, and then that travel is missing
+        # it published nothing meanwhile, and then that travel is missing
+        if now_s <= self._gap_until and self._says_lost and (problem or self._heads_elsewhere(place)):
             self._ledger.add("odometry", "unread", self._gap_unread_s)
             self._gap_until, problem = -math.inf, self._restart(place)
         self._unread_s = 0.0

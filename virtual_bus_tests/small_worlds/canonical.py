@@ -38,7 +38,7 @@ BEGAN_S = 99.0
 DIGITS = 3
 IGNORED = {
     "a count that is shown alone": (
-        "DriverCore._stats DriverCore.frames_dropped DriverCore.stops Axis._restarts Watchdog.trips "
+        "DriverCore._stats DriverCore.frames_dropped DriverCore.stops Watchdog.trips "
         "Watchdog._longest_gap_s Watchdog._counters_due _Source.received _Source.refused Command.refused "
         "LeaseBook.refused Observer.dropped BusReport.dropped SdoClient.dropped WatchdogLink.counters "
         "WatchdogState.lease_age_ms"

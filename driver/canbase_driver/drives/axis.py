@@ -60,7 +60,6 @@ class Axis:
         self._with_enable = VL_RAMP if layout.profile.is_vl else 0
         self._setpoint_cob_id = layout.setpoint_cob_id(drive.axis)
         self._control_hz = robot.rates.control_hz
-        self._restarts = 0
         self._status_is_new = False
         self._known_mps, self._known_at = 0.0, -math.inf
         """How fast it was when it was lost, and when."""
@@ -73,7 +72,7 @@ class Axis:
     @property
     def losses(self) -> int:
         """How often the travel went on from a new reference: what the wheel rolled meanwhile is unknown."""
-        return self._restarts + self.travel.losses
+        return self.travel.losses
 
     @property
     def fed_at(self) -> float:
@@ -95,7 +94,6 @@ class Axis:
 
     def forget(self) -> None:
         """What was received no longer counts: the drive restarted, or its bus did."""
-        self._restarts += self.status_at > -math.inf
         if self.velocity_at > -math.inf:
             self._known_mps, self._known_at = self.velocity_mps, self.velocity_at
         self.status_at = self.velocity_at = -math.inf

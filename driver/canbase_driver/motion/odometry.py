@@ -78,7 +78,7 @@ class WheelTravel:
         self._suspects = 0
         self._doubted = False
         self.losses = 0
-        """References that were lost to a jump, since start: each time the travel misses what happened meanwhile."""
+        """References that were lost, since start: each time the travel misses what happened meanwhile."""
 
     @property
     def travel_m(self) -> float:
@@ -92,6 +92,7 @@ class WheelTravel:
 
     def reset_reference(self) -> None:
         """The next sample is a new offset: after a drive's power cycle or a gap in its feedback. The travel stays."""
+        self.losses += self._accepted_raw is not None
         self._accepted_raw = None
         self._suspects = 0
         self._doubted = False

@@ -199,6 +199,15 @@ def test_a_node_that_was_not_asked_for_a_second_is_not_looked_for() -> None:
     assert story.node.presence is GONE
 
 
+def test_a_reference_from_between_the_loss_and_the_boot_is_lost_with_the_boot_and_counts() -> None:
+    story = Story().ready()
+    story.node.lose("was cut off from the bus", story.now_s)
+    story.status()
+    assert story.axis.losses == 1
+    story.started()
+    assert story.axis.losses == 2
+
+
 def test_a_second_boot_up_message_of_one_start_is_waited_for_in_the_next_boot() -> None:
     story = Story().ready()
     for said in ("if it does so after each boot, set start.settle_s", "again; the next boot waits for it"):
