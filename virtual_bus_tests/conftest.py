@@ -26,6 +26,11 @@ settings.register_profile(
     phases=[Phase.explicit, Phase.generate],
     suppress_health_check=[HealthCheck.too_slow],
 )
+# `make nightly`: new examples of a seed that is printed.
+settings.register_profile(
+    "nightly", deadline=None, max_examples=300, print_blob=True, database=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)  # fmt: skip
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 

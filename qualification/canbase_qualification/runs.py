@@ -12,7 +12,8 @@ from dataclasses import replace
 from typing import Final
 
 from canbase_campaign.cruise import Cruise, Run, RunError
-from canbase_campaign.plan import Plan, plan_for
+from canbase_campaign.plan import plan_for
+from canbase_campaign.planned import Plan
 from canbase_campaign.robots import GRAVITY_MPS2, DrawnRobot, body_for
 from canbase_campaign.scenario import Start
 from canbase_campaign.twins import GOAL, JOYSTICK, Twin

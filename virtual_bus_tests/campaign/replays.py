@@ -23,7 +23,8 @@ from rich.console import Console
 from rich.table import Table
 
 from canbase_campaign import forked
-from canbase_campaign.plan import Plan, draw_plan
+from canbase_campaign.plan import draw_plan
+from canbase_campaign.planned import Plan
 from canbase_campaign.runner import start_of
 from canbase_campaign.world import World
 from canbase_recording.replay import Replayed, replay_watchdog

@@ -3,9 +3,9 @@
 A scenario needs a safeguard when a property does not hold without it and does hold with it, all else being equal. Where
 other layers hold the same (`Need.beside`), those are taken out in both runs: so it is shown what this one adds to none.
 
-Scenarios are those that `make campaign` draws, from seed 0 on; those without one of a row's faults are counted, and not
-run. Where none of them needs a safeguard, scenarios are drawn from the row's faults alone. `teeth.json` has the number
-of scenarios that it took, the seed and the property.
+Scenarios are those of `make campaign` that begin from rest, from seed 0 on; those without one of a row's faults are
+counted, and not run. Where none of them needs a safeguard, scenarios are drawn from the row's faults alone.
+`teeth.json` has the number of scenarios that it took, the seed and the property.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def save(bites: dict[str, Bite]) -> None:
 
 def missed(need: Need, seed: int, directed: bool = False) -> str:
     """The property that holds in this scenario with the safeguard alone; empty: there is none."""
-    start, plan = start_of(seed), draw_plan(seed, need.faults if directed else ())
+    start, plan = start_of(seed), draw_plan(seed, need.faults if directed else (), from_rest=True)
     if not directed and need.faults and not {fault.name for fault in plan.faults} & set(need.faults):
         return ""
     if directed and need.quiet:

@@ -52,7 +52,7 @@ def test_the_same_seed_gives_the_same_scenario() -> None:
 
 # 0.58 s the driver hangs ── 0.77 s an encoder counts nothing ── 1.47 s it counts again ── 1.57 s the driver goes on
 def test_an_encoder_that_lies_while_the_driver_hangs_is_no_defect_of_its_odometry() -> None:
-    plan = draw_plan(6112)
+    plan = draw_plan(6112, from_rest=True)
     assert {each.name for each in plan.faults} == {"driver_hangs", "encoder_lost"}
     assert list(Start(robot_of(6112)).fork(plan).violations) == []
 

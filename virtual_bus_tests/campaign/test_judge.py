@@ -19,7 +19,7 @@ from canbase_action_server.outcome import ErrorCode
 from canbase_campaign import velocity_process
 from canbase_campaign.action_process import Goal
 from canbase_campaign.fault import PlannedFault
-from canbase_campaign.plan import GoalRequest, Plan, Segment
+from canbase_campaign.planned import GoalRequest, Plan, Segment
 from canbase_campaign.robots import draw_robot
 from canbase_campaign.scenario import Start
 from canbase_campaign.world import World

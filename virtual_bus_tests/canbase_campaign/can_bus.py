@@ -5,6 +5,7 @@ Each member sends in its own order; among the waiting heads the lowest identifie
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,6 +21,11 @@ REMOTE = 0x800
 """Above an identifier: a remote frame, which requests the frame with it. Every data frame goes before it."""
 NOTHING = 0x1000
 """No identifier: above all of eleven bits, and above all requests."""
+COMPUTER = ("driver", "watchdog")
+"""Members that share one adapter."""
+UNACKNOWLEDGED = 13
+"""Frames that wait in front of a bus without another node: txqueuelen of a CAN interface in Linux (10), and a
+controller's three mailboxes (bxCAN). Further ones are refused (ENOBUFS)."""
 QUEUE = 100
 """Frames that wait in one member's adapter; further ones are dropped, as a full transmit buffer does."""
 
@@ -47,13 +53,27 @@ class Disturbance:
     duplication: float = 0.0
     delay_s: float = 0.0
     """Longest delay; each frame draws its own, and none overtakes another on the same way."""
+    batch_s: float = 0.0
+    """The computer's adapter passes what it has, in both directions, once in this time."""
     blocked: set[tuple[str, str]] = field(default_factory=set)
     """(sender, receiver) that do not reach each other."""
 
     @property
     def quiet(self) -> bool:
         """Nothing is wrong."""
-        return not (self.loss or self.duplication or self.delay_s or self.blocked)
+        return not (self.loss or self.duplication or self.late_s or self.blocked)
+
+    @property
+    def late_s(self) -> float:
+        """Longest time on the way of a frame, the bus apart."""
+        return self.delay_s + self.batch_s
+
+    def arrival(self, sender: str, receiver: str, now_s: float, share: float) -> float:
+        """When a frame of now gets there; `share` of the longest delay is its own."""
+        at = now_s + share * self.delay_s
+        if self.batch_s and (sender in COMPUTER) != (receiver in COMPUTER):
+            at = math.ceil(at / self.batch_s) * self.batch_s
+        return at
 
 
 class Member:
@@ -67,21 +87,29 @@ class Member:
         self.others: list[Receiver] = []
         """Where its frames go."""
         self.late_until: dict[str, float] = {}
-        self._bus = bus
+        self._bus, self._held = bus, False
 
-    def send(self, cob_id: int, data: bytes) -> None:
-        """Put a frame into the transmit buffer."""
-        if len(self.waiting) < QUEUE:
-            if not self.waiting:
-                self.head = cob_id
-            self.waiting.append((cob_id, data))
-            self._bus.queued += 1
-            self._bus.start()
+    def send(self, cob_id: int, data: bytes) -> bool:
+        """Put a frame into the transmit buffer. False: it is full."""
+        if len(self.waiting) >= (UNACKNOWLEDGED if self._held else QUEUE):
+            return False
+        if not self.waiting and not self._held:
+            self.head = cob_id
+        self.waiting.append((cob_id, data))
+        self._bus.queued += 1
+        self._bus.start()
+        return True
+
+    def hold(self, held: bool) -> None:
+        """No node acknowledges its frames: its controller repeats the first one, and the others wait behind it."""
+        self._held = held
+        self.head = NOTHING if held or not self.waiting else self.waiting[0][0]
+        self._bus.start()
 
     def take(self) -> tuple[int, bytes]:
         """The first frame leaves the buffer."""
         frame = self.waiting.popleft()
-        self.head = self.waiting[0][0] if self.waiting else NOTHING
+        self.head = self.waiting[0][0] if self.waiting and not self._held else NOTHING
         return frame
 
 
@@ -142,8 +170,9 @@ class CanBus:
         trouble, draw = self.disturbance, self.random.random
         if (sender.name, member.name) in trouble.blocked or draw() < trouble.loss:
             return
-        if trouble.delay_s > 0.0:
-            arrival = max(self.clock.now_s + draw() * trouble.delay_s, member.late_until.get(sender.name, 0.0))
+        if trouble.late_s > 0.0:
+            arrival = trouble.arrival(sender.name, member.name, self.clock.now_s, draw())
+            arrival = max(arrival, member.late_until.get(sender.name, 0.0))
             member.late_until[sender.name] = arrival
             self.clock.at(arrival, member.receiver.hear, cob_id, data)
         else:

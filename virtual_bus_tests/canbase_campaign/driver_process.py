@@ -18,6 +18,8 @@ from canbase_velocity.twist import ZERO, Twist
 
 SETPOINTS = (0x200, 0x300)
 """First identifiers of the RPDOs with setpoints: docs/bus.md."""
+SEND_FAILURES = 10
+"""As in canbase_driver.runtime.bus_port."""
 ENABLE = b"\x0f\x00"
 """Controlword: enable operation."""
 
@@ -52,6 +54,8 @@ class DriverProcess(Process):
         self._last_frames: list[Frame] = []
         self._last_moving: dict[int, bytes] = {}
         self._moves = ZERO
+        self._refused = 0
+        """Frames in a row that its adapter did not take."""
         topics.subscribe("cmd_vel", self, self._on_command)
         self.begin()
 
@@ -139,7 +143,10 @@ class DriverProcess(Process):
         if self.bus_problem:
             return
         for frame in frames:
-            self._member.send(frame.cob_id, frame.data)
+            taken = self._member.send(frame.cob_id, frame.data)
+            self._refused = 0 if taken else self._refused + 1
+        if self._refused >= SEND_FAILURES:  # as bus_port.py does
+            self.bus_problem = "no buffer space available"
 
     def _changed(self, frames: list[Frame]) -> list[Frame]:
         """The cycle's frames as a misbehaving driver sends them; a healthy one changes nothing."""

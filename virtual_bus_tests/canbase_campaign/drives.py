@@ -45,6 +45,8 @@ class Drives:
         body = replace(drawn.body, step_s=pace.plant_step_s, bandwidth_radps=bandwidth_radps)
         self.bench = Bench(drawn.robot, bus.clock.now_s, body, BenchParameters(sdo_delay_s=pace.sdo_delay_s), odd)
         self.bench.base.push_n = drawn.push_n
+        self.friction_n = max(0.0, len(drawn.robot.drives) * drawn.body.coulomb_n - abs(drawn.push_n))
+        """What is left of the wheels' dry friction on this slope [N]."""
         self.measured: Callable[[int, bytes], bytes] = lambda cob_id, data: data
         """What becomes of a drive's frame before it is sent: sensors with noise."""
         self._members = {
@@ -69,8 +71,10 @@ class Drives:
 
     @staticmethod
     def rolls(axis: Axis) -> bool:
-        """Its wheel rolls: the motor has no power, or gives no force as its drive sees no motion of a dead encoder."""
+        """Its wheel rolls: the motor has no power, or no coupling, or its drive sees no motion of a dead encoder."""
         motor = axis.motor
+        if axis.uncoupled:
+            return True
         blind = not axis.encoder.closes_loop and abs(motor.force_n) <= ROLLS_SHARE * motor.peak_force_n
         return blind or not motor.powered
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from canbase_campaign.fault import stays
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.operator_faults import PEOPLE
-from canbase_campaign.plan import Plan
+from canbase_campaign.planned import Plan
 
 STEP_S = 0.01
 """The judge looks so often."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 from canbase_campaign.bus_faults import BUS_FAULTS
 from canbase_campaign.drive_faults import DRIVE_FAULTS
 from canbase_campaign.fault import Kind
+from canbase_campaign.faulty_drives import FAULTY_DRIVES
+from canbase_campaign.mechanics_faults import MECHANICS_FAULTS
 from canbase_campaign.operator_faults import PEOPLE
 from canbase_campaign.process_faults import PROCESS_FAULTS
 from canbase_campaign.received_faults import RECEIVED_FAULTS
@@ -18,6 +20,8 @@ FAULTS: dict[str, Kind] = {
     **PROCESS_FAULTS,
     **BUS_FAULTS,
     **DRIVE_FAULTS,
+    **FAULTY_DRIVES,
+    **MECHANICS_FAULTS,
     **SENSOR_FAULTS,
     **TOPIC_FAULTS,
     **RECEIVED_FAULTS,
@@ -50,3 +54,34 @@ ADDED = (
     "watchdog_starved",
 )
 """Drawn beside the others, each by itself: a new one here leaves the scenarios without it as they were."""
+ADDED_LATER = (
+    "action_crashes",
+    "adapter_batches",
+    "adapter_fails",
+    "all_hang",
+    "babbling_node",
+    "brake_drags",
+    "brownout",
+    "controller_restarts",
+    "coupling_broken",
+    "derating",
+    "drive_frozen",
+    "drive_stuck_on",
+    "driver_crashes",
+    "enables_slowly",
+    "leaves_operational",
+    "lifted",
+    "loss_bursts",
+    "no_acknowledge",
+    "overvoltage",
+    "partition",
+    "pushed",
+    "settings_lost",
+    "slip",
+    "status_stuck",
+    "torque_lies",
+    "velocity_crashes",
+    "watchdog_crashes",
+    "wheel_size",
+)
+"""The same, and rarer: with many faults at once the judge has to allow for more."""

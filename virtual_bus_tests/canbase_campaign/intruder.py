@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import struct
 
-from canbase_campaign.can_bus import CanBus, Receiver
+from canbase_campaign.can_bus import CanBus, Receiver, frame_bits
 from canbase_campaign.process import Topics
 from canbase_config.robot import Robot
 from canbase_config.units import mps_per_bit
 from canbase_velocity.twist import Twist
 
+BABBLED = 0x001
+"""Only NMT has a lower identifier."""
 ENABLE = 0x000F
 NMT_RESETS = (0x81, 0x82)
 """Reset node, reset communication."""
@@ -26,7 +28,7 @@ class Intruder:
     PERIOD_S = 0.01
 
     def __init__(self, robot: Robot, bus: CanBus, topics: Topics) -> None:
-        self._clock, self._topics = bus.clock, topics
+        self._bus, self._clock, self._topics = bus, bus.clock, topics
         self._member = bus.join("intruder", Receiver())
         self._robot = robot
         self.setpoints_mps = 0.0
@@ -38,6 +40,8 @@ class Intruder:
         """It publishes this to cmd_vel."""
         self.twin = 0
         """It answers as a second drive of this node id: switched on, at a stand."""
+        self.babbles = 0.0
+        """Share of the bus that it takes with frames of the lowest identifier."""
         self.moves_at = self.resets_at = -1.0
         """When it last sent setpoints or NMT commands, and when an NMT reset: both forget settings, 1016h too."""
         self._act()
@@ -60,6 +64,8 @@ class Intruder:
         if self.twin:
             self._member.send(0x180 + self.twin, TWIN_STATUS)
             self._member.send(0x280 + self.twin, bytes(4))
+        for _ in range(round(self.babbles * self.PERIOD_S * self._bus.bitrate / frame_bits(8))):
+            self._member.send(BABBLED, bytes(8))
         if self.twist is not None:
             self._topics.publish("cmd_vel", self.twist)
         self._clock.after(self.PERIOD_S, self._act)

@@ -25,7 +25,7 @@ from canbase_campaign.goal_judge import GoalJudge
 from canbase_campaign.motion_judge import MotionJudge
 from canbase_campaign.odometry_judge import OdometryJudge
 from canbase_campaign.outside import Outside, Surroundings
-from canbase_campaign.plan import Plan
+from canbase_campaign.planned import Plan
 from canbase_campaign.reach import BRAKES_S, Reach
 from canbase_campaign.short_judge import ShortJudge
 from canbase_campaign.shown import Shown
@@ -149,7 +149,7 @@ class Judge:
         active.coasting = tau_s > 0.0 and self._coasts()
         active.lost = self._reach.lost
         active.second_fault_s = notice_s(robot) * self._faults.overlap(now_s)
-        active.late_s = 2.0 * self._world.bus.disturbance.delay_s
+        active.late_s = 2.0 * self._world.bus.disturbance.late_s
         active.ladder_s = LADDER_S * (now_s <= self._strangers.ordered_on_bus_at + self._one_s)
         self.react_s = self._one_s + active.more_s
 

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from canbase_campaign.advice import OF_A_DRIVE, Advice, has_key, read_advice
 from canbase_campaign.judge import Judge
 from canbase_campaign.outside import Outside, Surroundings
-from canbase_campaign.plan import Plan
+from canbase_campaign.planned import Plan
 from canbase_campaign.robots import campaign_robot
 from canbase_campaign.world import World
 from canbase_config.profile import Profile

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from canbase_campaign.envelope import react_s
-from canbase_campaign.plan import GoalRequest, Plan, Segment
+from canbase_campaign.planned import GoalRequest, Plan, Segment
 from canbase_campaign.scanner import Scanner
 from canbase_campaign.world import World
 from canbase_config.robot import Robot

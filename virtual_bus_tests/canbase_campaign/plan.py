@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from random import Random
 
 from canbase_campaign.fault import PlannedFault
-from canbase_campaign.faults import ADDED, FAULTS
+from canbase_campaign.faults import ADDED, ADDED_LATER, FAULTS
+from canbase_campaign.planned import GoalRequest, Plan, Segment
 from canbase_campaign.robots import bitrates, robot_of
 from canbase_campaign.scanner import LIES
+from canbase_campaign.shape import shaped
 from canbase_config.action import Action
 from canbase_config.robot import Robot
 from canbase_velocity.twist import Twist
@@ -27,84 +29,36 @@ LIES_S = 2.0
 """So much longer is a scenario whose scanner lies: until the base has come to where the wall is."""
 FIRST_LIFE_S = 1.5
 """The faults of a first life last at most this long [s]."""
-ADDED_SHARE = 0.03
-"""Share of the scenarios that have one of canbase_campaign.faults.ADDED."""
+ADDED_SHARE, ADDED_LATER_SHARE = 0.03, 0.015
+"""Share of the scenarios that have one of canbase_campaign.faults.ADDED, or of ADDED_LATER."""
 HANDS = ("joystick", "navigation")
 """Sources that order motion, by their names in robot.yaml; a robot may lack the second one."""
 KINDS = ("constant", "constant", "constant", "weave", "burst", "nan", "zero")
 """How a source behaves for a while; a word that stands more often is drawn more often."""
 
 
-@dataclass(frozen=True, slots=True)
-class Segment:
-    """A source publishes at `rate_hz` for a while; not before, not after. Times from the scenario's start [s]."""
-
-    source: str
-    start_s: float
-    duration_s: float
-    kind: str
-    linear_mps: float
-    angular_radps: float
-    rate_hz: float
-
-    def __str__(self) -> str:
-        speed = f"{self.linear_mps:+.2f} m/s {self.angular_radps:+.2f} rad/s"
-        return (
-            f"{self.start_s:5.2f} s  {self.source} {self.kind} {speed}, {self.rate_hz:.0f} Hz, {self.duration_s:.2f} s"
-        )
+def _added(seed: int, later: bool) -> Iterator[str]:
+    """Those of ADDED, and of ADDED_LATER, that this scenario has too; each is drawn by itself."""
+    for names, share in ((ADDED, ADDED_SHARE), (ADDED_LATER if later else (), ADDED_LATER_SHARE)):
+        yield from (name for name in names if Random(f"{seed} {name}").random() < share)
 
 
-@dataclass(frozen=True, slots=True)
-class GoalRequest:
-    """A client sends a goal, and may cancel it."""
+def draw_plan(seed: int, only: Sequence[str] = (), from_rest: bool = False) -> Plan:
+    """The same seed gives the same plan, for the robot of this seed. `only`: the faults to draw from; empty: all.
 
-    start_s: float
-    distance_m: float
-    speed_mps: float
-    cancel_after_s: float | None
-
-    def __str__(self) -> str:
-        cancel = "" if self.cancel_after_s is None else f", cancelled after {self.cancel_after_s:.2f} s"
-        return f"{self.start_s:5.2f} s  goal {self.distance_m:+.3f} m at {self.speed_mps:.2f} m/s{cancel}"
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Everything that is given from outside."""
-
-    seed: int
-    duration_s: float
-    bitrate: int
-    segments: tuple[Segment, ...]
-    goals: tuple[GoalRequest, ...]
-    resets_s: tuple[float, ...]
-    faults: tuple[PlannedFault, ...]
-
-    def lines(self, robot: str) -> list[str]:
-        """The plan in words, after those about its `robot`."""
-        resets = [f"{at_s:5.2f} s  operator resets" for at_s in self.resets_s]
-        parts = [str(part) for part in (*self.segments, *self.goals, *self.faults)]
-        head = f"seed {self.seed}: {self.duration_s:.2f} s at {self.bitrate} bit/s"
-        return [head, robot, *sorted(parts + resets)]
-
-
-def _added(seed: int) -> Iterator[str]:
-    """Those of ADDED that this scenario has too. Each is drawn by itself: the others stay what they were."""
-    return (name for name in ADDED if Random(f"{seed} {name}").random() < ADDED_SHARE)
-
-
-def draw_plan(seed: int, only: Sequence[str] = ()) -> Plan:
-    """The same seed gives the same plan, for the robot of this seed. `only`: the faults to draw from; empty: all."""
+    `from_rest`: without the drive before the faults, and without ADDED_LATER: as in all reports up to 2026-11-26.
+    """
     robot = robot_of(seed).robot
-    return plan_for(robot, seed, bitrates(robot), only)
+    plan = plan_for(robot, seed, bitrates(robot), only, later=not from_rest)
+    return plan if from_rest else shaped(plan, robot, [name for name in HANDS if name in robot.mux.sources])
 
 
-def plan_for(robot: Robot, seed: int, rates: Sequence[int], only: Sequence[str] = ()) -> Plan:
-    """A plan for this robot. `rates`: bit rates to draw from [bit/s].
+def plan_for(robot: Robot, seed: int, rates: Sequence[int], only: Sequence[str] = (), later: bool = False) -> Plan:
+    """A plan for this robot. `rates`: bit rates to draw from [bit/s]. `later`: ADDED_LATER is drawn too.
 
     Speeds are drawn for the sample robot, and scaled to the limits of this one.
     """
-    pool = sorted(only or FAULTS.keys() - ADDED)
+    pool = sorted(only or FAULTS.keys() - ADDED - set(ADDED_LATER))
     random = Random(seed)
     duration_s = random.uniform(*SCENARIO_S)
     by_goals = random.random() < 0.35
@@ -120,7 +74,7 @@ def plan_for(robot: Robot, seed: int, rates: Sequence[int], only: Sequence[str] 
         tuple(random.uniform(0.8, duration_s) for _ in range(random.choice((0, 0, 1, 1, 2)))),
         tuple(_fault(name, random, robot) for name in names),
     )
-    more = () if only else tuple(_fault(name, Random(f"{seed} {name}"), robot) for name in _added(seed))
+    more = () if only else tuple(_fault(name, Random(f"{seed} {name}"), robot) for name in _added(seed, later))
     plan = replace(plan, faults=(*plan.faults, *more))
     if any(fault.name in LIES for fault in plan.faults):
         plan = _longer(plan)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from canbase_campaign.driver_process import SETPOINTS
 from canbase_campaign.fault import LONG, SHORT, Arguments, Change, Kind, nothing, wheel
+from canbase_campaign.operator_faults import goes_on
 
 if TYPE_CHECKING:
     from canbase_campaign.outside import Surroundings
@@ -120,6 +121,29 @@ def _starved(name: str) -> Kind:
     return Kind(f"{name} gets its processor for moments only", LONG, draw, begin, end)
 
 
+def _crashes(name: str) -> Kind:
+    """It is started again, as its service manager does, and dies again."""
+
+    def crash(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+        process = world.processes[name]
+        process.die() if number % 2 == 0 else process.restart()
+
+    def live(world: World, around: Surroundings, given: Arguments, number: int) -> None:
+        world.processes[name].restart()
+
+    return Kind(f"{name} is killed again and again", (1.0, 3.0), nothing, *goes_on(crash, live, 0.25))
+
+
+def _suspend(world: World, around: Surroundings, given: Arguments) -> None:
+    for name in PROCESSES:
+        world.processes[name].hang("suspend")
+
+
+def _resume(world: World, around: Surroundings, given: Arguments) -> None:
+    for name in PROCESSES:
+        world.processes[name].go_on("suspend")
+
+
 def _watchdog_deaf(world: World, around: Surroundings, given: Arguments) -> None:
     world.watchdog.fail_bus(True)
 
@@ -164,6 +188,8 @@ PROCESS_FAULTS: dict[str, Kind] = {
         lambda r: {"heartbeats": r.random() < 0.8},
         *_driver("repeats"),
     ),
+    **{f"{name}_crashes": _crashes(name) for name in PROCESSES},
+    "all_hang": Kind("no process gets a processor", (0.05, 1.5), nothing, _suspend, _resume),
     "setpoints_not_sent": Kind(
         "the driver sends no setpoints to one axis", (0.8, 3.0), wheel, _omits, _omits_nothing
     ),

@@ -8,7 +8,6 @@ its own quick stop closes its loop on that sensor. STO, wired, stops both. A wat
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from canbase_campaign.envelope import tolerance_mps
 from canbase_campaign.world import World
@@ -24,10 +23,17 @@ LAST_RUNGS_S = 0.1 + 0.1
 """Disable voltage, and heartbeat withheld: docs/bus.md."""
 LEAST_SHARE = 0.5
 """A wheel that brakes with less of its stated deceleration does not brake as it must: docs/bus.md."""
+SATURATED = 0.95
+"""With this share of the bus taken by the lowest identifier no frame of another one gets through."""
 RESETS_S = 0.2
 """From the last rung of the watchdog's ladder until the drive is without power: feedback by SDO, late cycles [s]."""
 BRAKES_S = 0.3
 """A wheel that turns again after a stop is slow: its drive takes this long to brake it [s]."""
+
+
+def _ignores_all(node: SimulatedNode) -> bool:
+    """Only a reset of the node has an effect on one of its motors."""
+    return any(axis.faults.frozen or axis.faults.stuck_on for axis in node.axes)
 
 
 class Reach:
@@ -72,7 +78,7 @@ class Reach:
                 self._ran_at[name] = now_s
         powered = [node for node in bench.nodes.values() if any(axis.motor.powered for axis in node.axes)]
         self._power_from = {node.node_id: self._power_from.get(node.node_id, now_s) for node in powered}
-        self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node.axes)}
+        self._weak = {node.node_id for node in powered if node.node_id in self._weak or self._is_weak(node)}
         lost = {node_id for node_id, _ in self.turning() if not stands and self._is_lost(node_id, now_s)}
         self.lost = bool(lost)
         self.was_lost = self.lost or (self.was_lost and not stands)
@@ -89,7 +95,7 @@ class Reach:
         node = self._world.drives.bench.nodes[node_id]
         was_reset = self._world.intruder.resets_at > self._power_from.get(node_id, math.inf)
         forgot = self.personality.heeds_masters and was_reset and not self._knows_masters(node)
-        able = node_id not in self._weak and not self._lies(node)
+        able = node_id not in self._weak and not self._lies(node) and not node.settings_lost
         return self.alone_s < math.inf and able and not forgot
 
     def ramp_has_ended(self, node_id: int, axis: int) -> bool:
@@ -126,7 +132,7 @@ class Reach:
         longest_s = 0.0
         for node_id, _ in self.turning():
             node = nodes[node_id]
-            lies = self._lies(node) or self._is_weak(node.axes) or now_s < self._cut_at[node_id] + lies_s
+            lies = self._lies(node) or self._is_weak(node) or now_s < self._cut_at[node_id] + lies_s
             waits = now_s < self.heard(node_id) + self.alone_s + BRAKES_S
             alone = not self._reached(node_id) and self.stops_alone(node_id) and waits
             longest_s = max(longest_s, lies_s if lies else 0.0, math.inf if alone else 0.0)
@@ -162,7 +168,7 @@ class Reach:
         """A driver or a watchdog that is there, and that behaves, has a line to it."""
         world = self._world
         driver, blocked = world.driver, world.bus.disturbance.blocked
-        if not world.drives.bench.nodes[node_id].line.hears:
+        if not world.drives.bench.nodes[node_id].line.hears or world.intruder.babbles >= SATURATED:
             return False
         sane = not driver.bus_problem and not driver.repeats and not driver.ignores_zero
         if sane and self._is_there("driver") and (not blocked or ("driver", f"drive{node_id}") not in blocked):
@@ -186,20 +192,25 @@ class Reach:
     def _reacts(self, node_id: int) -> bool:
         """In its fault reaction a drive takes no controlword (CiA 402-2, transition 14), and it ends on its sensor.
 
-        Or it does not brake in it.
+        Or it does not brake in it. Or its application hangs, or its power stage cannot be switched off.
         """
         node = self._world.drives.bench.nodes[node_id]
-        lies = self._lies(node) or self._is_weak(node.axes)
+        if _ignores_all(node):
+            return True
+        lies = self._lies(node) or self._is_weak(node)
         return lies and any(axis.state is State.FAULT_REACTION_ACTIVE for axis in node.axes)
 
-    def _is_weak(self, axes: Iterable[Axis]) -> bool:
-        """A quick stop, or a fault reaction, of one of them has hardly an effect, though its settings demand one."""
-        return any(axis.motor.stop_mps2 < self._least_mps2 <= axis.stated_mps2 for axis in axes)
+    def _is_weak(self, node: SimulatedNode) -> bool:
+        """A quick stop, or a fault reaction, of one of its motors has hardly an effect, though its settings demand one;
+        or it has lost those."""
+        least_mps2 = self._least_mps2
+        weak = [axis for axis in node.axes if axis.motor.stop_mps2 < least_mps2]
+        return any(node.settings_lost or axis.stated_mps2 >= least_mps2 for axis in weak)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:
         """The loop of one of its motors closes on a sensor on which it cannot brake."""
-        return any(not axis.encoder.closes_loop for axis in node.axes)
+        return any(not axis.encoder.closes_loop for axis in node.axes) or _ignores_all(node)
 
     def _knows_masters(self, node: SimulatedNode) -> bool:
         if self.personality.heeds_guarding:

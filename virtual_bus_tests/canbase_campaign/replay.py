@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from canbase_campaign.can_bus import REMOTE
-from canbase_campaign.plan import Plan
+from canbase_campaign.planned import Plan
 from canbase_campaign.robots import DrawnRobot
 from canbase_campaign.scenario import Result, Start
 from canbase_campaign.world import World
@@ -61,7 +61,7 @@ def _watch(world: World, frames: bool) -> None:
 
 def replay(drawn: DrawnRobot, plan: Plan, frames: bool, say: Callable[[str], None]) -> Result:
     """Run the scenario with this robot and `say` what happens, line by line."""
-    start = Start(drawn)
+    start = Start(drawn, plan.boots)
     world = start.world
     for line in plan.lines(str(drawn)):
         say(line)

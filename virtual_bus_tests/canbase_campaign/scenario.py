@@ -14,7 +14,7 @@ from canbase_campaign.fault import PlannedFault
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.judge import Judge, Violation
 from canbase_campaign.outside import Outside, Surroundings
-from canbase_campaign.plan import Plan
+from canbase_campaign.planned import Plan
 from canbase_campaign.robots import DrawnRobot
 from canbase_campaign.scanner import LIES
 from canbase_campaign.world import World
@@ -25,6 +25,10 @@ QUIET_S = 0.3
 """A base that is latched and stands is watched for this long after the last fault, reset and goal; then that is all."""
 GOALS_END_S = 12.0
 """So long a scenario goes on at least until its goals have ended; longer where robot.yaml leaves them more time."""
+
+
+UPTIMES_S = (100.0, 100.0, 2.0**31 / 1000.0 - 5.0, 100.0, 2.0**32 / 1000.0 - 5.0, 3e8)
+"""Monotonic time when a world begins: also just before 2³¹ and 2³² ms, and after ten years."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,19 +50,29 @@ class Result:
     processor_s: float = field(default=0.0, compare=False)
 
 
-class Start:
-    """A world that is enabled and at rest, from which the scenarios of one robot begin."""
+def uptime_s(drawn: DrawnRobot | None) -> float:
+    """How long the computer of this robot has been running [s]: one number of UPTIMES_S for each."""
+    return UPTIMES_S[drawn.number % len(UPTIMES_S)] if drawn is not None else UPTIMES_S[0]
 
-    def __init__(self, drawn: DrawnRobot | None = None) -> None:
-        """`drawn`: None: the sample robot."""
-        self.world = World(drawn=drawn)
+
+class Start:
+    """A world that is enabled and at rest, from which the scenarios of one robot begin; those with a boot make one."""
+
+    def __init__(self, drawn: DrawnRobot | None = None, boots: bool = False) -> None:
+        """`drawn`: None: the sample robot. `boots`: the world is not enabled yet."""
+        self._drawn, self._boots = drawn, boots
+        self.world = World(drawn=drawn, uptime_s=uptime_s(drawn))
         self.around = Surroundings(self.world, has_scanner=self.world.robot.safety.scan.required)
+        if boots:
+            return
         self.world.enable()
         gc.collect()
         gc.freeze()
 
     def run(self, plan: Plan, note: Callable[[float, str], None] | None = None) -> Result:
-        """Run one scenario in this very world, which is spent then."""
+        """Run one scenario in this very world, which is spent then; or in a new one, where it begins with a boot."""
+        if plan.boots and not self._boots:
+            return Start(self._drawn, boots=True).run(plan, note)
         began = time.process_time()
         run = _Run(self.world, self.around, plan, note)
         return run.result(time.process_time() - began)

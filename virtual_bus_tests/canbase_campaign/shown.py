@@ -8,6 +8,12 @@ with the motion in the measure of the encoders. A side has the measure of the en
 from __future__ import annotations
 
 from canbase_campaign.world import World
+from canbase_sim.cia402.axis import Axis
+
+
+def _lies(axis: Axis) -> bool:
+    """Its position on the bus may be another one than that of its encoder, or that one than its motor's."""
+    return axis.encoder.is_faulty or axis.faults.frozen or axis.faults.frozen_position is not None
 
 
 class Shown:
@@ -44,7 +50,7 @@ class Shown:
     @property
     def tells_truth(self) -> bool:
         """Each position on the bus is that of the wheel."""
-        lies = any(axis.encoder.is_faulty or axis.faults.frozen_position is not None for axis in self._axes)
+        lies = any(_lies(axis) for axis in self._axes) or not self._base.is_as_configured
         return not lies and not self._intruder.twin
 
     @property

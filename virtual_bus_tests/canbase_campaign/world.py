@@ -38,15 +38,16 @@ class World:
         pace: Pace = FINE,
         drawn: DrawnRobot | None = None,
         odd: Mapping[int, OddDrive] = MappingProxyType({}),
+        uptime_s: float = 100.0,
     ) -> None:
         """`drawn`: a robot with its body and its floor; None: `robot`, or the sample, on a level floor.
 
-        `odd`: drives of the kind `odd`, by node id.
+        `odd`: drives of the kind `odd`, by node id. `uptime_s`: monotonic time when it begins.
         """
         self.drawn = drawn or DrawnRobot(0, robot or campaign_robot(), PlantParameters())
         self.robot = self.drawn.robot
         self.random = Random(seed)
-        self.clock = clock = Clock(100.0)
+        self.clock = clock = Clock(uptime_s)
         self.note: Callable[[str], None] = lambda text: None
         self.on_lease: Callable[[Twist], None] = lambda twist: None
         self.on_goal_end: Callable[[Goal], None] = lambda goal: None

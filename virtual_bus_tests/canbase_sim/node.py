@@ -14,7 +14,7 @@ from canopen import SdoAbortedError
 
 from canbase_sim.axis_parts import AxisParts, StateChange
 from canbase_sim.cia301 import abort, emcy, heartbeat, life_guarding, nmt, sdo_server, store
-from canbase_sim.cia301.dictionary import AXIS_STRIDE, FIRST_AXIS, Dictionary, key
+from canbase_sim.cia301.dictionary import AXIS_STRIDE, FIRST_AXIS, VOLATILE, Dictionary, key
 from canbase_sim.cia301.nmt import NmtCommand, NmtState
 from canbase_sim.cia301.rpdo import Rpdo
 from canbase_sim.cia301.sdo_channels import SdoChannels
@@ -34,6 +34,8 @@ COMMUNICATION_FAULT = 0x7500
 """603Fh when NMT stop or a reset meets an axis with 6007h = 1."""
 GUARD = 0
 """In the place of a node id: the master whose requests guard the node."""
+LOST = ((0x100C, 0x1029), (0x6000, 0x9FFF))
+"""First and last index of what `lose_settings` loses."""
 RESET_S = 0.01
 """From NMT reset communication to the boot-up message [s]."""
 OFFSET_STEP = 1_000_003
@@ -65,6 +67,8 @@ class SimulatedNode:
         self.boot_delay_s = boot_delay_s if personality.boot_delay_s is None else personality.boot_delay_s
         self.line = self._make_line(sdo_delay_s if personality.sdo_delay_s is None else personality.sdo_delay_s)
         self.state = NmtState.INITIALISING
+        self.settings_lost = False
+        """It runs with the settings of its EDS, or those stored in it, in place of those of its boot."""
         self.changes: deque[StateChange] = deque(maxlen=1000)
         self.lost_producers: deque[int] = deque(maxlen=100)
         """Node ids whose heartbeat this node has missed, GUARD for a master that guarded it; the reader that reports
@@ -166,6 +170,21 @@ class SimulatedNode:
         self.line.cut, self._bus_on_at = True, now_s + off_s
         self._lose_connection(emcy.BUS_OFF_RECOVERED)
 
+    def lose_settings(self) -> None:
+        """While it runs: its parameters, and what it watches, are those stored in it, or of its EDS."""
+        values = self.dictionary.values
+        kept = {place: values[place] for place in values if place >> 8 in VOLATILE}
+        for first, last in LOST:
+            self.dictionary.reset(first, last)
+        values |= kept
+        self._consumer.configure()
+        self.guarding.reset()
+        self.settings_lost = True
+
+    def leave_operational(self) -> None:
+        """By itself: what watches its program has found something. The motors go on."""
+        self._enter(NmtState.PRE_OPERATIONAL)
+
     def say_boot_up(self) -> None:
         """A boot-up message. Called by a test it is one too many: nothing was restarted."""
         self.line.say_boot_up(Frame(heartbeat.COB_ID + self.node_id, bytes([NmtState.INITIALISING])))
@@ -249,6 +268,7 @@ class SimulatedNode:
 
     def _power_up(self, now_s: float, off_s: float) -> None:
         self.lss.power_on()
+        self.settings_lost = False
         self.dictionary.reset(0x2000, 0x9FFF)
         for axis in self.axes:
             axis.restart()

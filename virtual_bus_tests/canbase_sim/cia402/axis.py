@@ -66,6 +66,17 @@ class AxisFaults:
     """Of 60FFh, that the motor is given."""
     stop_share: float = 1.0
     """Of the slopes with which it stops by itself, quick stop and fault reaction among them; 0: it keeps its speed."""
+    frozen: bool = False
+    """Its application hangs: the values of the last moment stay, no controlword, setpoint or lost heartbeat has an
+    effect, and the motor keeps its last goal. CANopen stack and velocity loop run on; a reset of the node ends it."""
+    stuck_on: bool = False
+    """The power stage neither stops nor switches off, whatever the statusword shows; a reset of the node ends it."""
+    stuck_status: int | None = None
+    """6041h shows this."""
+    stuck_torque: int | None = None
+    """6077h and 6078h show this."""
+    cannot_enable: bool = False
+    """The power stage is not ready: OPERATION ENABLED is refused."""
     force_share: float = 1.0
     """Of the force that 6072h allows. Set by `Axis.weaken`."""
     supply: Supply = Supply.FULL
@@ -94,6 +105,8 @@ class Axis:
     faults: AxisFaults = field(default_factory=AxisFaults)
     ramp_up_mps2: float = AT_ONCE
     """Its own ramp away from zero, where that is slower than 6083h: soft starts of the maker [m/s²]."""
+    uncoupled: bool = False
+    """Its motor turns, and its wheel rolls without it."""
     causes: set[int] = field(default_factory=set)
     """Error codes whose cause still holds; no fault reset before it is empty."""
     _base: int = field(default=0, init=False)
@@ -125,6 +138,7 @@ class Axis:
 
     def restart(self) -> None:
         """Transition 0, power on or NMT reset node: power stage off, everything forgotten."""
+        self.faults.frozen = self.faults.stuck_on = False
         self.motor.power_off()
         self._limit_force()
         self._take_polarity()
@@ -157,6 +171,8 @@ class Axis:
 
     def fail(self, code: int) -> None:
         """A fault: transition 13, reaction by 605Eh, then 14. `code` is 603Fh and the EMCY code."""
+        if self.faults.frozen:
+            return
         self._put(0x3F, code)
         self._told.append(code)
         self.tell_error(code)
@@ -171,7 +187,7 @@ class Axis:
 
     def abort_connection(self, code: int) -> None:
         """The connection is lost: 6007h chooses nothing, fault, disable voltage or quick stop."""
-        option = self._value(0x07)
+        option = 0 if self.faults.frozen else self._value(0x07)
         if option == 1:
             self.fail(code)
         elif option == 2:
@@ -188,19 +204,24 @@ class Axis:
 
     def starve(self) -> None:
         """The maker's own watchdog: the motor stops, nothing else changes, and the next target moves it again."""
-        if self.state is _ENABLED:
+        if self.state is _ENABLED and not self.faults.frozen:
             self._stop(1, _stay)
 
     def refresh(self) -> None:
         """Bring statusword, position, velocities and torque in the dictionary up to date."""
         values, base, motor, faults = self.dictionary.values, self._base << 8, self.motor, self.faults
+        if faults.frozen:
+            return
         position, velocity = faults.frozen_position, faults.stuck_velocity
         actual = self.velocity() if velocity is None else velocity
         values[base + 0x6400] = self.position() if position is None else position
         values[base + 0x6C00] = actual
-        values[base + 0x4100] = self._statusword(actual)
+        values[base + 0x4100] = self._statusword(actual) if faults.stuck_status is None else faults.stuck_status
         values[base + 0x6B00] = self._turned(self.scale.raw(motor.demand_mps))
-        values[base + 0x7700] = values[base + 0x7800] = int(1000.0 * motor.force_n / motor.peak_force_n)
+        torque = faults.stuck_torque
+        if torque is None:
+            torque = int(1000.0 * motor.force_n / motor.peak_force_n)
+        values[base + 0x7700] = values[base + 0x7800] = torque
 
     @property
     def stated_mps2(self) -> float:
@@ -219,7 +240,7 @@ class Axis:
     # The state machine
 
     def _on_controlword(self, value: int) -> None:
-        if value == self._controlword and self.state is _ENABLED:
+        if self.faults.frozen or (value == self._controlword and self.state is _ENABLED):
             return
         rose = value & ~self._controlword & Bit.FAULT_RESET
         self._controlword = value
@@ -269,14 +290,14 @@ class Axis:
         if transition.number in _NEEDS and self.faults.supply in _NEEDS[transition.number]:
             return False
         if transition.number == 4:
-            return self._value(0x60) != NO_MODE
+            return self._value(0x60) != NO_MODE and not self.faults.cannot_enable
         return transition.number != 16 or self._value(0x5A) in STAYS_IN_QUICK_STOP
 
     def _go(self, transition: Transition) -> None:
         """Take the new state; outside of the powered states the power stage is off."""
         before, self.state = self.state, transition.target
         self._state_bits = self.state.value
-        if self.state not in POWERED:
+        if self.state not in POWERED and not self.faults.stuck_on:
             self.motor.power_off()
         self._show_mode()
         self.on_change(before, transition)
@@ -304,7 +325,7 @@ class Axis:
 
     def _steer(self) -> None:
         """Give the motor its goal: the target velocity, or zero while halt is set."""
-        if self.state is not _ENABLED or self._pending is not None:
+        if self.state is not _ENABLED or self._pending is not None or self.faults.frozen:
             return
         if self._halted:
             self._stop(self._value(0x5D), _stay)
@@ -329,6 +350,9 @@ class Axis:
 
     def _stop(self, option: int, then: Callable[[], None]) -> None:
         """Stop as 605Ah to 605Eh count: 0 coast, 1 ramp 6084h, 2 quick-stop ramp 6085h, 3 and 4 at the torque limit."""
+        if self.faults.stuck_on:
+            then()
+            return
         if option == 0:
             self.motor.power_off()
             then()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, pi, sin
+from math import copysign, cos, pi, sin
 
 from canbase_sim.plant.motor import Motor
 
@@ -71,6 +71,22 @@ class MountedWheel:
     direction: int
 
 
+class FreeRotor:
+    """A motor whose coupling to its wheel is broken: it turns alone, and the wheel rolls without it. SI, at the rim."""
+
+    def __init__(self, motor: Motor, mass_kg: float, friction_n: float, step_s: float) -> None:
+        self.motor, self._mass_kg, self._friction_n, self._h = motor, mass_kg, friction_n, step_s
+        self.speed_mps, self.travel_m = motor.speed_mps, 0.0
+
+    def step(self) -> None:
+        """One inner step."""
+        speed = self.speed_mps + self.motor.step(self.speed_mps) / self._mass_kg * self._h
+        rubs = self._friction_n / self._mass_kg * self._h
+        speed = 0.0 if abs(speed) <= rubs else speed - copysign(rubs, speed)
+        self.travel_m += (self.speed_mps + speed) * self._h / 2.0
+        self.speed_mps = speed
+
+
 class Base:
     """The moving robot. All fields are ground truth: pose in the frame where it started, rim speeds, ways."""
 
@@ -90,6 +106,10 @@ class Base:
         self._bound_left, self._bound_right = (parameters.coulomb_n * self._h * len(side) for side in (left, right))
         self._own_bounds = (self._bound_left, self._bound_right)
         self._grip_left, self._grip_right = 1.0 - parameters.slip_left, 1.0 - parameters.slip_right
+        self._parameters = parameters
+        self.free_rotors: list[FreeRotor] = []
+        """Motors that do not drive their wheels any more."""
+        self._lifted: set[str] = set()
         self._invert_mass_matrix(parameters)
         self.x_m = self.y_m = self.turned_rad = 0.0
         self.v_left_mps = self.v_right_mps = 0.0
@@ -131,6 +151,40 @@ class Base:
         else:
             self._bound_right = self._own_bounds[1] + impulse
 
+    @property
+    def is_as_configured(self) -> bool:
+        """Each wheel rolls on the floor, with its size, and its motor turns it."""
+        p = self._parameters
+        grips = self._grip_left == 1.0 - p.slip_left and self._grip_right == 1.0 - p.slip_right
+        return grips and not self.free_rotors and not self._lifted
+
+    def grip(self, side: str, share: float) -> None:
+        """The rims of a side move the base by `share` of their way: below 1 they slip, above 1 they are larger."""
+        if side == "left":
+            self._grip_left = share * (1.0 - self._parameters.slip_left)
+        else:
+            self._grip_right = share * (1.0 - self._parameters.slip_right)
+
+    def lift(self, side: str, lifted: bool) -> None:
+        """The wheels of a side leave the floor: they turn without the body, which turns about them."""
+        self._lifted = self._lifted | {side} if lifted else self._lifted - {side}
+        self.grip(side, 0.0 if lifted else 1.0)
+        self._invert_mass_matrix(self._parameters)
+        if not self._lifted:
+            return
+        p, wheels = self._parameters, {"left": len(self._left), "right": len(self._right)}
+        free, body = ({side: p.wheel_mass_kg * max(1, count) for side, count in wheels.items()}, p.mass_kg / 2.0)
+        left_kg, right_kg = (free[side] + (0.0 if side in self._lifted else body) for side in ("left", "right"))
+        self._inverse_left, self._inverse_right, self._cross = 1.0 / left_kg, 1.0 / right_kg, 0.0
+
+    def uncouple(self, motor: Motor) -> FreeRotor:
+        """The coupling of this motor breaks, for good."""
+        for side in (self._left, self._right):
+            side[:] = [pair for pair in side if pair[0] is not motor]
+        p = self._parameters
+        self.free_rotors.append(FreeRotor(motor, p.wheel_mass_kg, p.coulomb_n / 4.0, self._h))
+        return self.free_rotors[-1]
+
     def step(self, now_s: float) -> None:
         """Advance by one inner step that ends at `now_s`."""
         vl, vr, h = self.v_left_mps, self.v_right_mps, self._h
@@ -140,6 +194,8 @@ class Base:
             push_left += direction * motor.step(direction * vl)
         for motor, direction in self._right:
             push_right += direction * motor.step(direction * vr)
+        for rotor in self.free_rotors:
+            rotor.step()
         a, b, c = self._inverse_left, self._inverse_right, self._cross
         new_left = vl + (a * push_left + c * push_right) * h
         new_right = vr + (c * push_left + b * push_right) * h
@@ -182,7 +238,7 @@ class Base:
         self.turned_rad += turn
         self.travel_m += way
         self.path_m += abs(way)
-        self.resting = vl == 0.0 == vr and left == 0.0 == right and not self.push_n
+        self.resting = vl == 0.0 == vr and left == 0.0 == right and not self.push_n and not self.free_rotors
         self.v_left_mps, self.v_right_mps = vl, vr
         if abs(vl) > self._standstill or abs(vr) > self._standstill:
             self.time_of_motion = now_s

@@ -73,6 +73,11 @@ class Encoder:
         self._count(1.0)
         self._fault = None
 
+    def follow(self, travel_m: Callable[[], float]) -> None:
+        """From now on it counts another travel: that of a motor whose coupling to its wheel is broken."""
+        self._shown_m, self._at_m = self.travel_m, travel_m()
+        self._true_m = travel_m
+
     def sample(self, speed_mps: float) -> float:
         """One inner step at this true speed; the speed that is measured."""
         fault = self._fault

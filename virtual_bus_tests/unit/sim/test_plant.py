@@ -250,3 +250,48 @@ def test_enabling_at_speed_starts_from_that_speed() -> None:
     motor.power_on()
     assert motor.demand_mps == 0.4
     assert motor.step(0.4) == 0.0
+
+
+def test_a_wheel_that_slips_turns_and_moves_the_base_less() -> None:
+    """Both rims at 0.5 m/s, the left one with half of its way: 0.375 m/s and a turn to the left."""
+    robot = Robot()
+    robot.order(0.5, 0.5)
+    robot.base.grip("left", 0.5)
+    assert not robot.base.is_as_configured
+    robot.run(1.0)
+    assert robot.base.v_left_mps == pytest.approx(0.5, abs=0.005)
+    assert robot.base.v_mps == pytest.approx(0.375, abs=0.005)
+    assert robot.base.w_radps == pytest.approx(0.25 / TRACK_M, abs=0.01)
+    robot.base.grip("left", 1.0)
+    assert robot.base.is_as_configured
+
+
+def test_a_base_with_one_side_in_the_air_turns_about_it() -> None:
+    robot = Robot()
+    robot.base.lift("right", True)
+    robot.order(0.5, 0.5)
+    robot.run(1.5)
+    assert robot.base.v_right_mps == pytest.approx(0.5, abs=0.02), "it turns in the air"
+    assert robot.base.v_mps == pytest.approx(0.25, abs=0.01)
+    assert robot.base.w_radps < -0.9
+    robot.base.lift("right", False)
+    assert robot.base.is_as_configured
+    robot.run(1.0)
+    assert robot.base.v_mps == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_motor_without_a_coupling_turns_alone_and_its_wheel_rolls_out() -> None:
+    """t   0 both at 0.5 m/s; the left coupling breaks, and zero is ordered"""
+    robot = Robot()
+    robot.order(0.5, 0.5)
+    robot.run(1.0)
+    rotor = robot.base.uncouple(robot.left[0])
+    robot.order(0.0, 0.0)
+    robot.run(0.6)
+    assert rotor.speed_mps == pytest.approx(0.0, abs=0.01), "the motor stops as ordered"
+    assert 0.1 < rotor.travel_m < 0.16, "0.5 m/s at 1 m/s²"
+    assert robot.base.v_left_mps > 0.03, "the wheel rolls on"
+    assert abs(robot.base.v_right_mps) < 0.01
+    robot.run(3.0)
+    assert robot.base.v_left_mps == 0.0, "friction stops it"
+    assert not robot.base.is_as_configured
