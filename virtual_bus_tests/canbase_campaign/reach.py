@@ -94,8 +94,9 @@ class Reach:
         """The drive stops when it receives nothing: it monitors its masters, it brakes, and its sensors are right."""
         node = self._world.drives.bench.nodes[node_id]
         was_reset = self._world.intruder.resets_at > self._power_from.get(node_id, math.inf)
-        forgot = self.personality.heeds_masters and was_reset and not self._knows_masters(node)
-        able = node_id not in self._weak and not self._lies(node) and not node.settings_lost
+        may_forget = self.personality.heeds_masters and (was_reset or node.settings_lost)
+        forgot = may_forget and not self._knows_masters(node)
+        able = node_id not in self._weak and not self._lies(node)
         return self.alone_s < math.inf and able and not forgot
 
     def ramp_has_ended(self, node_id: int, axis: int) -> bool:

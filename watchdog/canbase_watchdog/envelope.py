@@ -6,7 +6,8 @@ Rules
    the driver still follow it (its command timeout, its cycle, latency, and the time that the jerk limit adds).
 3. Then a bound falls to what is ordered now. As the driver keeps the curvature while it slows down, linear and angular
    bounds wait for each other: braking for a turn that has to end as well, a turn for braking, and also for a linear
-   velocity that grows or is reversed.
+   velocity that is reversed, or that still has to grow. The slower one sets the time (a reversal: both of them), and
+   what has grown is waited for no more.
 4. Before the watchdog started anything within the limits may have been ordered.
 5. From `emergency_wait_s` after "brakes hard" on, orders allow nothing: all bounds fall to zero together, with the
    emergency deceleration, as the driver does then. Orders of before count no more, also when the base is at standstill.
@@ -79,7 +80,7 @@ class Way:
         self._high, self._low = Peak(hold_s), Peak(hold_s)
         self._high.set(ceiling, now_s, now_s)
         self.level = self.most = ceiling
-        self.least = 0.0
+        self.least = self.grown = 0.0
 
     def order(self, value: float, now_s: float, until: float) -> None:
         """An order, negative for the opposite way; above the ceiling it allows no more than the ceiling."""
@@ -91,16 +92,26 @@ class Way:
         """Bring the most and the least of what was ordered up to date."""
         self.most, self.least = self._high.greatest(now_s), -self._low.greatest(now_s)
         self.level = max(self.level, self.most)
+        self.grown = min(self.grown, self.least)
 
     def cease(self) -> None:
         """What was ordered is forgotten, and what is ordered allows nothing now. What is allowed is left, to fall."""
         self._high.forget()
         self._low.forget()
-        self.most = self.least = 0.0
+        self.most = self.least = self.grown = 0.0
 
     def fall(self, kept: float) -> None:
         """Keep this share of what is allowed beyond the most that was ordered."""
         self.level = self.most + (self.level - self.most) * kept
+
+    def grow(self, kept: float) -> None:
+        """At least so fast the driver goes this way: of what is missing to the least order, this share is left."""
+        self.grown = self.least - (self.least - self.grown) * kept
+
+    @property
+    def growth(self) -> float:
+        """By so much the driver may still have to grow, to the most that was ordered."""
+        return self.most - self.grown
 
     @property
     def excess(self) -> float:
@@ -193,12 +204,32 @@ class Envelope:
         for way in self._ways:
             way.look(now_s)
         forward, backward, left, right = self._ways
-        if forward.excess or backward.excess or left.excess or right.excess:
+        falls = forward.excess or backward.excess or left.excess or right.excess
+        if falls or forward.growth or backward.growth:
             linear_s, angular_s = self._falling_s()
+            self._grow(elapsed_s, angular_s)
             forward.fall(_kept(elapsed_s, linear_s))
             backward.fall(_kept(elapsed_s, linear_s))
             left.fall(_kept(elapsed_s, angular_s))
             right.fall(_kept(elapsed_s, angular_s))
+
+    def _grow(self, elapsed_s: float, angular_s: float) -> None:
+        """What is ordered has grown when a turn has fallen, and one that is ordered has grown as well.
+
+        It does not grow before the opposite way is braked. An order that the driver scales down, as a wheel cannot go
+        so fast, tells nothing of how fast it goes.
+        """
+        config = self._config
+        forward, backward, left, right = self._ways
+        linear_mps, angular_radps = max(forward.most, backward.most), max(left.most, right.most)
+        scaled = linear_mps + angular_radps * config.track_m / 2.0 > config.max_wheel_mps
+        unknown = scaled or angular_radps >= config.angular_radps
+        kept = _kept(elapsed_s, angular_s + angular_radps / config.angular_acceleration_radps2)
+        for way, opposite in ((forward, backward), (backward, forward)):
+            if unknown or opposite.level > 0.0:
+                way.grown = 0.0
+            else:
+                way.grow(kept)
 
     def _falling_s(self) -> tuple[float, float]:
         """How long the linear and the angular bounds still take to fall to what is ordered (rule 3)."""
@@ -213,8 +244,9 @@ class Envelope:
             right.excess / (reversing if left.most > 0.0 else turning),
             max(forward.span, backward.span) / braking,
         )
-        growth_s = max(forward.most, backward.most) / min(config.acceleration_mps2, braking)
-        return max(linear_s, waits_s), angular_s + growth_s
+        growth_s = max(forward.growth, backward.growth) / min(config.acceleration_mps2, braking)
+        reverses = (forward.growth and backward.level) or (backward.growth and forward.level)
+        return max(linear_s, waits_s), angular_s + growth_s if reverses else max(angular_s, growth_s)
 
 
 def _kept(elapsed_s: float, falling_s: float) -> float:

@@ -238,14 +238,72 @@ def test_braking_waits_while_any_order_of_the_last_moments_ends_the_turn() -> No
     assert line.order(0.0, 2.0, 0.19).linear_high == pytest.approx(0.46, abs=0.01)  # 0.5 × (1 - 0.2 s / 2 s), and on
 
 
-def test_a_turn_waits_for_the_linear_velocity_that_grows() -> None:
+# 1 m/s at 0.5 m/s² takes 2 s, the turn itself 0.4 s: the slower one sets the time, and the turn ends with it
+@pytest.mark.parametrize("after_s", [0.05, 0.2, 0.5, 1.0, 1.5, 1.9, 1.95, 2.0])
+def test_a_turn_waits_for_the_linear_velocity_that_grows_and_no_longer(after_s: float) -> None:
     line = Timeline(acceleration_mps2=0.5)
     line.order(0.0, 2.0, 1.0)
-    line.order(1.0, 0.0, 0.35)  # 2 s to grow, 0.4 s for the turn alone
-    bounds = line.order(1.0, 0.0, 0.2)
-    assert bounds.angular_high == pytest.approx(2.0 * (1 - 0.2 / 2.4), abs=0.03)
-    line.order(0.0, 0.0, 1.2)
-    assert numbers(line.order(0.0, 0.0, 0.7)) == NOTHING
+    line.order(1.0, 0.0, 0.35)
+    assert line.order(1.0, 0.0, after_s).angular_high == pytest.approx(2.0 - after_s, abs=0.011)
+
+
+def test_a_growth_that_is_interrupted_begins_at_zero_again() -> None:
+    line = Timeline(acceleration_mps2=0.5)
+    line.order(0.0, 2.0, 1.0)
+    line.order(1.0, 0.0, 1.35)
+    line.order(0.0, 0.0, 0.02)  # 0.98 rad/s are left, and 2 s
+    assert line.order(1.0, 0.0, 0.2).angular_high == pytest.approx(0.98 * (1 - 0.2 / 2.0), abs=0.02)
+
+
+# -0.3 m/s, then 0.5 m/s: nothing grows until it is braked. dw/dt = -w / (w / 5 + 1 s): the turn, then the growth
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(("after_s", "left_radps"), [(0.1, 1.86), (0.3, 1.60), (0.8, 1.08), (1.3, 0.71)])
+def test_a_turn_waits_for_a_reversal_and_then_for_what_grows(way: float, after_s: float, left_radps: float) -> None:
+    line = Timeline(acceleration_mps2=0.5)
+    line.order(-0.3 * way, 2.0, 1.0)
+    line.order(0.5 * way, 0.0, 0.35)
+    assert line.order(0.5 * way, 0.0, after_s).angular_high == pytest.approx(left_radps, abs=0.02)
+
+
+# Ordered for 5 s: what has grown is waited for no more. Where the driver has to scale an order down nobody knows what
+# has grown: then it is all of it.
+@pytest.mark.parametrize(
+    ("linear", "angular", "falls_s"),
+    [
+        (0.6, 2.0, 0.4),  # 1.0 m/s at the rim, the limit
+        (-0.6, -2.0, 0.4),
+        (0.601, 2.0, 6.01),
+        (-0.601, -2.0, 6.01),
+        (0.2, 3.99, 0.798),
+        (0.2, 4.0, 2.0),  # the greatest turn: more may have been ordered
+    ],
+)
+def test_what_has_grown_is_waited_for_no_more(linear: float, angular: float, falls_s: float) -> None:
+    line = Timeline(acceleration_mps2=0.1)
+    line.order(linear, angular, 20.0)
+    line.order(linear, 0.0, 0.35)
+    bounds = line.order(linear, 0.0, falls_s / 2.0)
+    assert bounds.angular_low + bounds.angular_high == pytest.approx(angular / 2.0, abs=0.05)
+    assert line.order(linear, 0.0, 0.45 * falls_s).angular_high == pytest.approx(max(0.0, angular) / 20.0, abs=0.05)
+
+
+def test_what_grows_waits_for_a_turn_that_grows() -> None:
+    """2 rad/s at 1 rad/s² take 2 s, 0.5 m/s alone 1 s. After 0.75 s of both 0.31 m/s are missing, at the least."""
+    line = Timeline(acceleration_mps2=0.5, angular_acceleration_radps2=1.0)
+    line.order(0.0, 0.0, 1.0)
+    line.order(0.5, 2.0, 1.1)
+    line.order(0.5, 0.0, 0.35)
+    assert line.order(0.5, 0.0, 0.2).angular_high > 1.3
+
+
+def test_an_emergency_stop_forgets_what_has_grown() -> None:
+    """It was at standstill in between: 0.5 m/s grow again, in 1 s."""
+    line = Timeline(acceleration_mps2=0.5, emergency_wait_s=0.0, emergency_deceleration_mps2=2.0)
+    line.order(0.5, 0.0, 3.0)
+    hard_bounds(line, 0.5, LONG_AGO + 0.001 + line.t, linear=0.5)
+    line.order(0.5, 2.0, 0.02)
+    line.order(0.5, 0.0, 0.35)
+    assert line.order(0.5, 0.0, 0.2).angular_high > 1.3
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])

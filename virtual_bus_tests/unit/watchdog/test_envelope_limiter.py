@@ -54,6 +54,7 @@ def test_the_drivers_limiter_stays_inside(seed: int) -> None:
     limits, track_m = some_limits(random), random.choice((0.2, 0.5, 1.0))
     jerk_s = max(limits.acceleration_mps2, limits.deceleration_mps2) / limits.jerk_mps3
     told = limits.model_dump(exclude={"emergency_deceleration_mps2", "jerk_mps3"}) | {"track_m": track_m}
+    told["max_wheel_mps"] = Limiter(limits, track_m).wheel_mps
     envelope = Envelope(replace(CONFIG, **told, order_hold_s=LATENCY_S + 2 * CYCLE_S + jerk_s), -BEFORE_S)
     limiter, motion, command, order = Limiter(limits, track_m), MotionState.AT_REST, Twist2D.ZERO, Twist2D.ZERO
     under_way: deque[tuple[float, Twist2D]] = deque()
