@@ -193,9 +193,9 @@ class DriverBox:
         self.ring, self._state = Ring(self._seconds), None
         self._begin()
 
-    def _on_sent(self, cob_id: int, data: bytes) -> None:
+    def _on_sent(self, cob_id: int, data: bytes) -> bool:
         self.ring.frame(self.now_s, cob_id, data, False)
-        self._member_send(cob_id, data)
+        return self._member_send(cob_id, data)
 
     def _on_heard(self, cob_id: int, data: bytes) -> None:
         """A frame has the time at which it came, also where the driver hangs and takes it in later."""
