@@ -64,9 +64,13 @@ class Intruder:
         if self.twin:
             self._member.send(0x180 + self.twin, TWIN_STATUS)
             self._member.send(0x280 + self.twin, bytes(4))
-        if self.babbles:  # a bus in a small world is infinitely fast, and nobody babbles there
-            for _ in range(round(self.babbles * self.PERIOD_S * self._bus.bitrate / frame_bits(8))):
-                self._member.send(BABBLED, bytes(8))
+        self._babble()
         if self.twist is not None:
             self._topics.publish("cmd_vel", self.twist)
         self._clock.after(self.PERIOD_S, self._act)
+
+    def _babble(self) -> None:
+        if not self.babbles:
+            return  # a bus in a small world is infinitely fast: there is no share of it
+        for _ in range(round(self.babbles * self.PERIOD_S * self._bus.bitrate / frame_bits(8))):
+            self._member.send(BABBLED, bytes(8))

@@ -195,7 +195,7 @@ class DriverBox:
 
     def _on_sent(self, cob_id: int, data: bytes) -> bool:
         self.ring.frame(self.now_s, cob_id, data, False)
-        return self._member_send(cob_id, data)
+        return bool(self._member_send(cob_id, data))
 
     def _on_heard(self, cob_id: int, data: bytes) -> None:
         """A frame has the time at which it came, also where the driver hangs and takes it in later."""
