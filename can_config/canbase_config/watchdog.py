@@ -193,6 +193,11 @@ class WatchdogConfig:
         return guard_time_ms(self.drive_heartbeat_s) / 1000.0
 
     @property
+    def is_virtual(self) -> bool:
+        """The bus has no wire: its drives are simulated."""
+        return self.bus_arguments.get("interface") in ("udp_multicast", "virtual")
+
+    @property
     def hears_itself(self) -> bool:
         """A multicast bus gives its frames back to their sender; SocketCAN and other adapters do not."""
         return self.bus_arguments.get("interface") == "udp_multicast"

@@ -20,12 +20,14 @@ from typing import Final
 
 from canbase_runtime import latch_record
 from canbase_runtime import single_instance as sole
+from canbase_runtime.lasting import forgets
 from canbase_runtime.latch_record import Defect, Found, Record
 
 PARTS: Final = ("driver", "watchdog", "velocity")
 SUFFIX: Final = ".latch"
 WRITER: Final = "writer of records"
 """What is held while a process writes one, beside `sole`'s other tasks."""
+MOUNT: Final = "mount a folder of a disk there: a volume, for a container"
 RETRY_S: Final = 1.0
 _MACHINE: Final = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
 _OPEN: Final = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
@@ -94,8 +96,9 @@ def create_first(folder: Path, robot: str) -> bool:
 class LatchFile:
     """One part's record. One thread at a time."""
 
-    def __init__(self, folder: Path, part: str, robot: str) -> None:
-        self.path = folder / f"{part}{SUFFIX}"
+    def __init__(self, folder: Path, part: str, robot: str, *, must_last: bool = False) -> None:
+        """`must_last`: of drives that turn. A record that a reboot may take back counts as latched."""
+        self.path, self._must_last = folder / f"{part}{SUFFIX}", must_last
         self._owner = latch_record.owner_of(part, robot, machine())
         self._descriptor: int | None = None
         self._sequence = 0
@@ -108,6 +111,8 @@ class LatchFile:
             found = Found(defect=Defect.MISSING, detail=str(self.path))
         except OSError as error:
             found = Found(defect=Defect.UNREADABLE, detail=f"{self.path}: {error.strerror or error}")
+        if self._must_last and found.says_nothing and (kind := _forgets(self.path)):
+            found = Found(defect=Defect.FORGETS, detail=f"{self.path.parent} is on {kind}; {MOUNT}")
         self._sequence = found.sequence
         if found.defect is not Defect.NONE:
             self.close()
@@ -160,6 +165,14 @@ class LatchFile:
             os.close(descriptor)
             raise
         self._descriptor, self._sequence = descriptor, 2
+
+
+def _forgets(path: Path) -> str:
+    try:
+        mounts = Path("/proc/self/mountinfo").read_text("utf-8", "replace")
+    except OSError:
+        mounts = ""
+    return forgets(os.path.realpath(path.parent), mounts)
 
 
 class LatchKeeper(threading.Thread):

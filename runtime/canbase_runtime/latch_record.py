@@ -55,6 +55,7 @@ class Defect(enum.Enum):
     VERSION = "the record of stops was written by another version of canbase"
     OWNER = "the record of stops is another robot's or another computer's"
     ACCESS = "the record of stops can be changed by others"
+    FORGETS = "the record of stops is not kept over a reboot"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,11 @@ class Found:
     def latched(self) -> bool:
         """A reset is needed: anything but a readable CLEAR."""
         return self.defect is not Defect.NONE or self.record.mark is not Mark.CLEAR
+
+    @property
+    def says_nothing(self) -> bool:
+        """As the record of a new robot after its first reset: nothing is latched, and nobody switched anything off."""
+        return not self.latched and self.record.code == 0
 
     @property
     def sentence(self) -> str:

@@ -64,7 +64,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
 def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Callable[[], None]) -> None:
     inputs = InputRing(robot.black_box.seconds)
     mux = MuxNode(robot, inputs.note)
-    keeper = LatchKeeper(LatchFile(folder, "velocity", robot.name))
+    keeper = LatchKeeper(LatchFile(folder, "velocity", robot.name, must_last=not robot.bus.is_virtual))
     safety = FilterNode(robot, mux.moving_sources, keeper, inputs.note)
     recorder = StopRecorder(robot, inputs, mux, safety)
     mux.lead(safety)

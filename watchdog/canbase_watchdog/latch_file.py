@@ -9,6 +9,7 @@ import contextlib
 import errno
 import os
 import queue
+import re
 import stat
 import threading
 from collections.abc import Mapping
@@ -22,6 +23,8 @@ RETRY_S = 1.0
 STACK_BYTES = 512 * 1024
 """Of the keeper's stack. The watchdog locks its memory (`realtime.py`), so all of it is resident: 8 MB by default."""
 _MACHINE = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
+UNKNOWN = "an unknown file system"
+_FORGET = (UNKNOWN, "aufs", "cramfs", "erofs", "overlay", "ramfs", "rootfs", "squashfs", "tmpfs")
 _FLAGS = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
 
@@ -46,11 +49,15 @@ def machine() -> str:
 class Keeper(threading.Thread):
     """Reads the record at once (`past`), then writes what `want` is given. `failure`: the defect that ended it."""
 
-    def __init__(self, path: Path, robot: str) -> None:
+    def __init__(self, path: Path, robot: str, *, must_last: bool = False) -> None:
+        """`must_last`: of drives that turn. A record that a reboot may take back counts as latched."""
         super().__init__(name="latch", daemon=True)
         self._path, self._whose = path, latch.owner(robot, machine())
         self._descriptor: int | None = None
         self.past = self._read()
+        if must_last and not self.past.latched and (kind := _forgets(path)):
+            problem = f"{path.parent} is on {kind}, which a reboot empties; mount a folder of a disk there"
+            self.past = replace(self.past, problem=problem)
         self._sequence = self.past.sequence
         self._wanted: Entry | None = None
         self._pending: Entry | None = None
@@ -168,6 +175,26 @@ class Keeper(threading.Thread):
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
+
+
+def _forgets(path: Path) -> str:
+    """The file system that is in memory, or a layer over an image, by the kernel's table of mounts; empty: a disk."""
+    try:
+        mounts = Path("/proc/self/mountinfo").read_text("utf-8", "replace")
+    except OSError:
+        mounts = ""
+    kind = _file_system(os.path.realpath(path.parent), mounts)
+    return kind if kind in _FORGET else ""
+
+
+def _file_system(folder: str, mountinfo: str) -> str:
+    """Of the longest mount point above, proc_pid_mountinfo(5): 36 35 98:0 / /point rw shared:1 - ext4 /dev/sda1 rw."""
+    longest, kind = -1, UNKNOWN
+    for words in (line.split() for line in mountinfo.splitlines()):
+        point = re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), words[4]).rstrip("/")
+        if len(point) >= longest and f"{folder}/".startswith(f"{point}/"):
+            longest, kind = len(point), words[words.index("-") + 1]
+    return kind
 
 
 def _access(descriptor: int, folder: Path) -> str:

@@ -50,7 +50,7 @@ def live(config: WatchdogConfig, record: Path, asked: list[int], *, after_loss: 
         uid = os.getuid() if config.lease_uid is None else config.lease_uid
         leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
-        keeper = Keeper(record, config.robot)
+        keeper = Keeper(record, config.robot, must_last=not config.is_virtual)
         started_s = time.monotonic()
         watchdog = Watchdog(config, started_s, keeper.past, echo=config.hears_itself)
         if after_loss and watchdog.status.state is State.TRIPPED:

@@ -81,7 +81,7 @@ def run(
     rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)
     aim = Aim.ACTIVE if autostart else Aim.RELEASED
     ring = Ring(robot.black_box.seconds)
-    keeper = LatchKeeper(LatchFile(folder, "driver", robot.name))
+    keeper = LatchKeeper(LatchFile(folder, "driver", robot.name, must_last=not robot.bus.is_virtual))
     core = DriverCore(robot, aim, keeper.found)
     loop = ControlLoop(core, claim.bus, robot.rates.control_hz, robot.rates.odometry_hz, ring, keeper)
     writer = BlackBoxWriter(robot.black_box, robot.name, get_logger("motor_driver").warning, about(robot))
