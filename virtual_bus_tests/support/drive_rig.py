@@ -70,14 +70,20 @@ class Surroundings(threading.Thread):
         while not self._ended.is_set():
             received = self._bus.recv(0.001)
             with self._lock:
-                self._turn(received, time.monotonic())
+                while received is not None:  # all that waits: one a turn falls behind on a busy computer, for good
+                    self._take(received, time.monotonic())
+                    received = self._bus.recv(0.0)
+                self._turn(time.monotonic())
 
-    def _turn(self, received: can.Message | None, now_s: float) -> None:
-        if received is not None and not received.is_extended_id and not received.is_remote_frame:
-            data = bytes(received.data)
-            self.heard.append((now_s, received.arbitration_id, data))
-            self._to_drives(received.arbitration_id, data, now_s)
-            self._watchdog.on_frame(received.arbitration_id, data, now_s)
+    def _take(self, received: can.Message, now_s: float) -> None:
+        if received.is_extended_id or received.is_remote_frame:
+            return
+        data = bytes(received.data)
+        self.heard.append((now_s, received.arbitration_id, data))
+        self._to_drives(received.arbitration_id, data, now_s)
+        self._watchdog.on_frame(received.arbitration_id, data, now_s)
+
+    def _turn(self, now_s: float) -> None:
         self._lease(now_s)
         for frame in self._watchdog.tick(now_s):
             self._say(frame.cob_id, frame.data, remote=frame.remote)
