@@ -23,8 +23,11 @@ RETRY_S = 1.0
 STACK_BYTES = 512 * 1024
 """Of the keeper's stack. The watchdog locks its memory (`realtime.py`), so all of it is resident: 8 MB by default."""
 _MACHINE = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
-UNKNOWN = "an unknown file system"
-_FORGET = (UNKNOWN, "aufs", "cramfs", "erofs", "overlay", "ramfs", "rootfs", "squashfs", "tmpfs")
+_LASTS = (
+    "9p", "btrfs", "cifs", "ext2", "ext3", "ext4", "f2fs", "jffs2", "nfs", "nfs4", "ubifs", "vfat", "virtiofs", "xfs",
+    "zfs",
+)  # fmt: skip
+"""Types of file systems on disks, flash memory and other computers; what is not known may be in memory."""
 _FLAGS = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
 
@@ -178,23 +181,26 @@ class Keeper(threading.Thread):
 
 
 def _forgets(path: Path) -> str:
-    """The file system that is in memory, or a layer over an image, by the kernel's table of mounts; empty: a disk."""
+    """The file system, by the kernel's table of mounts, that is not known to last over a reboot; empty: it lasts."""
     try:
         mounts = Path("/proc/self/mountinfo").read_text("utf-8", "replace")
     except OSError:
         mounts = ""
-    kind = _file_system(os.path.realpath(path.parent), mounts)
-    return kind if kind in _FORGET else ""
+    kind, device = _file_system(os.path.realpath(path.parent), mounts)
+    if device.startswith(("/dev/ram", "/dev/zram")):
+        return f"{kind} in memory ({device})"
+    return "" if kind in _LASTS else kind
 
 
-def _file_system(folder: str, mountinfo: str) -> str:
-    """Of the longest mount point above, proc_pid_mountinfo(5): 36 35 98:0 / /point rw shared:1 - ext4 /dev/sda1 rw."""
-    longest, kind = -1, UNKNOWN
+def _file_system(folder: str, mountinfo: str) -> tuple[str, str]:
+    """Type and device of the longest mount point above: 36 35 98:0 / /point rw shared:1 - ext4 /dev/sda1 rw."""
+    longest, found = -1, ("an unknown file system", "")
     for words in (line.split() for line in mountinfo.splitlines()):
         point = re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), words[4]).rstrip("/")
         if len(point) >= longest and f"{folder}/".startswith(f"{point}/"):
-            longest, kind = len(point), words[words.index("-") + 1]
-    return kind
+            after = words.index("-")
+            longest, found = len(point), (words[after + 1], words[after + 2])
+    return found
 
 
 def _access(descriptor: int, folder: Path) -> str:

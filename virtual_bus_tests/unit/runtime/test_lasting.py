@@ -61,8 +61,28 @@ ODD = DISK + "92 28 0:61 / /var/lib/my\\040r\u00f6bot rw - tmpfs tmpfs rw\n"
 )
 def test_what_is_in_memory_or_a_layer_over_an_image_is_forgotten(mounts: str, folder: str, kind: str) -> None:
     assert forgets(folder, mounts) == kind
-    found = of_watchdog._file_system(folder, mounts)
-    assert (found if found in of_watchdog._FORGET else "") == kind
+
+
+@pytest.mark.parametrize(
+    ("kind", "device", "lasts"),
+    [
+        *((kind, "/dev/sda1", True) for kind in ("ext4", "xfs", "btrfs", "f2fs", "vfat")),
+        ("nfs4", "server:/robots", True),
+        ("virtiofs", "shared", True),
+        *((kind, kind, False) for kind in ("tmpfs", "ramfs", "overlay", "squashfs", "fuse.fuse-overlayfs", "devtmpfs")),
+        ("a_new_one", "/dev/sda1", False),
+        ("ext4", "/dev/ram0", False),
+        ("ext4", "/dev/zram12", False),
+        ("ext4", "/dev/mapper/ramses", True),
+    ],
+)
+def test_what_is_not_known_to_last_counts_as_forgotten_in_driver_and_watchdog_alike(
+    kind: str, device: str, lasts: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mounts = f"28 1 254:1 / / rw,relatime shared:1 - {kind} {device} rw\n"
+    mounted(monkeypatch, mounts)
+    assert (forgets("/var/lib/canbase", mounts) == "") is lasts
+    assert of_watchdog._forgets(tmp_path / "watchdog.latch") == forgets("/var/lib/canbase", mounts)
 
 
 def mounted(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
