@@ -395,7 +395,9 @@ def test_who_is_not_let_in_is_refused_and_the_robot_does_not_notice(site: Site) 
     after = site.robot.wait_any_state()
     assert (after.state, after.watchdog_trips) == (before.state, before.watchdog_trips)
     cycles = (time.monotonic() - began_s) * site.robot.robot.rates.control_hz
-    assert after.overruns - before.overruns <= 2 + 0.05 * cycles, "other tests on this computer may delay some"
+    # A second in which this test and the browser have both processors: one cycle of five may begin late, none so late
+    # that the watchdog trips.
+    assert after.overruns - before.overruns <= 2 + 0.2 * cycles
 
 
 def _session(site: Site) -> str:
