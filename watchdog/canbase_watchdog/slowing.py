@@ -62,7 +62,7 @@ class SlowingWatch:
         self._slope, self._since = slope, since
         self._window_s = slope.window_s
         self._past: deque[tuple[float, float]] = deque()
-        """When, and how high above a line that falls so steeply."""
+        """When, and how fast it was."""
         self._bad_since, self._bad = math.inf, 0
         self._at = since
         """When the last sample came."""
@@ -81,17 +81,18 @@ class SlowingWatch:
             self._past.clear()
             self._bad = 0
             return
-        level = abs(speed_mps) + self._slope.least_mps2 * at
-        self._past.append((at, level))
+        mps = abs(speed_mps)
+        self._past.append((at, mps))
         while self._past[0][0] < at - self._window_s - HELD_S:
             self._past.popleft()
-        bad = abs(speed_mps) > self._slope.floor_mps and self._is_above(level, at)
+        bad = mps > self._slope.floor_mps and self._is_above(mps, at)
         if bad and not self._bad:
             self._bad_since = at
         self._bad = self._bad + 1 if bad else 0
 
-    def _is_above(self, level: float, at: float) -> bool:
+    def _is_above(self, mps: float, at: float) -> bool:
         """Rule 2: above all of the lines, and so above the highest."""
-        before = [past for then, past in self._past if then <= at - self._window_s]
+        fall = self._slope.least_mps2
+        lines = [past - fall * (at - then) for then, past in self._past if then <= at - self._window_s]
         judged = at >= self._since + self._slope.lag_s + self._window_s
-        return judged and bool(before) and level > max(before) + self._slope.noise_mps
+        return judged and bool(lines) and mps > max(lines) + self._slope.noise_mps
