@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.owner import ETC, old
 from canbase_runtime.latch_file import create_first
+from canbase_runtime.own_folder import open_own_folder
 
 COMMAND_S = 60.0
 
@@ -74,7 +75,7 @@ class Executor:
         """Whole or not at all, and never readable for more than it is meant to be."""
         if self._dry_run:
             return
-        path.parent.mkdir(parents=True, exist_ok=True)
+        self._make_folder(path.parent)
         new = path.with_name(f".{path.name}.new")
         new.unlink(missing_ok=True)
         descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
@@ -85,6 +86,13 @@ class Executor:
             os.fchmod(descriptor, action.mode)
         new.replace(path)
 
+    def _make_folder(self, folder: Path) -> None:
+        """Nobody but root may change it or a folder above it: root works by path below. Raises FolderError."""
+        if self._prefix == Path("/"):
+            os.close(open_own_folder(folder, 0o755))
+        else:
+            folder.mkdir(parents=True, exist_ok=True)
+
     def _link(self, action: Link) -> None:
         path = self._below(action.path)
         if path.is_symlink() and os.readlink(path) == action.target:
@@ -92,7 +100,7 @@ class Executor:
             return
         self._tell("linked   ", action.path)
         if not self._dry_run:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            self._make_folder(path.parent)
             path.unlink(missing_ok=True)
             path.symlink_to(action.target)
 
@@ -103,6 +111,7 @@ class Executor:
         self._tell("removed  ", action.path)
         if self._dry_run:
             return
+        self._make_folder(path.parent)
         path.unlink()
         made = path.parent.suffix in (".d", ".wants") or ETC in action.path.parent.parents
         if made and not any(path.parent.iterdir()):
@@ -150,11 +159,14 @@ def first_records(folder: Path, robot: str, user: str) -> bool:
 
 def _make_for(account: pwd.struct_passwd, folder: Path) -> None:
     """A folder of that user in a folder of root, where it is not there."""
+    above = open_own_folder(folder.parent, 0o755)
     try:
-        folder.mkdir(mode=0o700, parents=True)
+        os.mkdir(folder.name, 0o700, dir_fd=above)
+        os.chown(folder.name, account.pw_uid, account.pw_gid, dir_fd=above, follow_symlinks=False)
     except FileExistsError:
         return
-    os.chown(folder, account.pw_uid, account.pw_gid, follow_symlinks=False)
+    finally:
+        os.close(above)
 
 
 def as_user(account: pwd.struct_passwd, do: Callable[[], bool]) -> bool:

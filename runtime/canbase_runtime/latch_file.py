@@ -22,6 +22,7 @@ from canbase_runtime import latch_record
 from canbase_runtime import single_instance as sole
 from canbase_runtime.lasting import forgets
 from canbase_runtime.latch_record import Defect, Found, Record
+from canbase_runtime.own_folder import FolderError, open_own_folder
 
 PARTS: Final = ("driver", "watchdog", "velocity")
 SUFFIX: Final = ".latch"
@@ -76,20 +77,20 @@ def create_first(folder: Path, robot: str) -> bool:
     """
     if folder.exists():
         return False
-    folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    os.close(open_own_folder(folder.parent, 0o700))
     new = folder.with_name(f".{folder.name}.new{os.getpid()}")
     new.mkdir(mode=0o700)
     try:
         for part in PARTS:
             path = new / f"{part}{SUFFIX}"
             owner = latch_record.owner_of(part, robot, machine())
-            os.close(_put(path, latch_record.whole(Record(), owner)))
-        _sync(new)
+            os.close(_put(str(path), latch_record.whole(Record(), owner)))
+        _sync(str(new))
         new.rename(folder)
     except BaseException:
         shutil.rmtree(new, ignore_errors=True)
         raise
-    _sync(folder.parent)
+    _sync(str(folder.parent))
     return True
 
 
@@ -109,6 +110,8 @@ class LatchFile:
             found = self._read()
         except FileNotFoundError:
             found = Found(defect=Defect.MISSING, detail=str(self.path))
+        except FolderError as error:
+            found = Found(defect=Defect.ACCESS, detail=str(error))
         except OSError as error:
             found = Found(defect=Defect.UNREADABLE, detail=f"{self.path}: {error.strerror or error}")
         if self._must_last and found.says_nothing and (kind := _forgets(self.path)):
@@ -136,14 +139,16 @@ class LatchFile:
             self._descriptor = None
 
     def _read(self) -> Found:
-        writable = True
+        writable, folder = True, open_own_folder(self.path.parent)
         try:
-            self._descriptor = os.open(self.path, os.O_RDWR | _OPEN)
+            self._descriptor = os.open(self.path.name, os.O_RDWR | _OPEN, dir_fd=folder)
         except OSError as error:
             if error.errno != errno.EROFS:
                 raise
             writable = False
-            self._descriptor = os.open(self.path, os.O_RDONLY | _OPEN)
+            self._descriptor = os.open(self.path.name, os.O_RDONLY | _OPEN, dir_fd=folder)
+        finally:
+            os.close(folder)
         if wrong := _wrong_access(self._descriptor, self.path):
             return Found(defect=Defect.ACCESS, detail=wrong)
         found = latch_record.read(os.pread(self._descriptor, latch_record.SIZE + 1, 0), self._owner)
@@ -154,16 +159,19 @@ class LatchFile:
         return replace(found, detail=f"{self.path}: {found.detail}")
 
     def _replace(self, record: Record) -> None:
-        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = self.path.with_name(f".{self.path.name}.new")
-        new.unlink(missing_ok=True)
-        descriptor = _put(new, latch_record.whole(record, self._owner))
+        folder, new = open_own_folder(self.path.parent, 0o700), f".{self.path.name}.new"
         try:
-            new.replace(self.path)
-            _sync(self.path.parent)
-        except BaseException:
-            os.close(descriptor)
-            raise
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(new, dir_fd=folder)
+            descriptor = _put(new, latch_record.whole(record, self._owner), folder)
+            try:
+                os.rename(new, self.path.name, src_dir_fd=folder, dst_dir_fd=folder)
+                _sync(".", folder)
+            except BaseException:
+                os.close(descriptor)
+                raise
+        finally:
+            os.close(folder)
         self._descriptor, self._sequence = descriptor, 2
 
 
@@ -265,22 +273,22 @@ def _wrong_access(descriptor: int, path: Path) -> str:
     return ""
 
 
-def _put(path: Path, data: bytes) -> int:
-    """A new file with these bytes on disk; its descriptor."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _OPEN, 0o600)
+def _put(path: str, data: bytes, folder: int | None = None) -> int:
+    """A new file with these bytes on disk; its descriptor. `folder`: `path` is a name in it."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _OPEN, 0o600, dir_fd=folder)
     try:
         if os.write(descriptor, data) != len(data):
             raise OSError(f"{path}: written in part")
         os.fsync(descriptor)
     except BaseException:
         os.close(descriptor)
-        path.unlink(missing_ok=True)
+        os.unlink(path, dir_fd=folder)
         raise
     return descriptor
 
 
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+def _sync(path: str, folder: int | None = None) -> None:
+    descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC, dir_fd=folder)
     try:
         os.fsync(descriptor)
     finally:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from canbase_watchdog import latch
 from canbase_watchdog.latch import Entry, Past
+from canbase_watchdog.own_folder import open_own_folder
 
 RETRY_S = 1.0
 STACK_BYTES = 512 * 1024
@@ -135,20 +136,23 @@ class Keeper(threading.Thread):
 
     def _replace(self, entry: Entry) -> None:
         """A new file, whole on disk before it gets its name."""
-        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = self._path.with_name(f".{self._path.name}.new")
-        new.unlink(missing_ok=True)
-        descriptor = os.open(new, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, 0o600)
+        folder, new = open_own_folder(self._path.parent, 0o700), f".{self._path.name}.new"
         try:
-            data = latch.page(entry, 1, self._whose) + latch.page(entry, 2, self._whose)
-            if os.write(descriptor, data) != len(data):
-                raise OSError("written in part")
-            os.fsync(descriptor)
-            new.replace(self._path)
-            _sync(self._path.parent)
-        except BaseException:
-            os.close(descriptor)
-            raise
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(new, dir_fd=folder)
+            descriptor = os.open(new, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, 0o600, dir_fd=folder)
+            try:
+                data = latch.page(entry, 1, self._whose) + latch.page(entry, 2, self._whose)
+                if os.write(descriptor, data) != len(data):
+                    raise OSError("written in part")
+                os.fsync(descriptor)
+                os.rename(new, self._path.name, src_dir_fd=folder, dst_dir_fd=folder)
+                _sync(folder)
+            except BaseException:
+                os.close(descriptor)
+                raise
+        finally:
+            os.close(folder)
         self._descriptor, self._sequence = descriptor, 2
 
     def _read(self) -> Past:
@@ -160,19 +164,28 @@ class Keeper(threading.Thread):
 
     def _read_file(self) -> Past:
         try:
-            self._descriptor = os.open(self._path, os.O_RDWR | _FLAGS)
-        except OSError as error:
-            if error.errno != errno.EROFS:
-                return Past(problem=error.strerror or str(error))
-        try:
-            descriptor = os.open(self._path, os.O_RDONLY | _FLAGS)
-            try:
-                problem = _access(descriptor, self._path.parent)
-                return Past(problem=problem) if problem else latch.decode(os.read(descriptor, 16384), self._whose)
-            finally:
-                os.close(descriptor)
+            folder = open_own_folder(self._path.parent)
         except OSError as error:
             return Past(problem=error.strerror or str(error))
+        try:
+            return self._read_in(folder)
+        except OSError as error:
+            return Past(problem=error.strerror or str(error))
+        finally:
+            os.close(folder)
+
+    def _read_in(self, folder: int) -> Past:
+        try:
+            self._descriptor = os.open(self._path.name, os.O_RDWR | _FLAGS, dir_fd=folder)
+        except OSError as error:
+            if error.errno != errno.EROFS:
+                raise
+        descriptor = os.open(self._path.name, os.O_RDONLY | _FLAGS, dir_fd=folder)
+        try:
+            problem = _access(descriptor, folder)
+            return Past(problem=problem) if problem else latch.decode(os.read(descriptor, 16384), self._whose)
+        finally:
+            os.close(descriptor)
 
     def _close(self) -> None:
         if self._descriptor is not None:
@@ -203,9 +216,9 @@ def _file_system(folder: str, mountinfo: str) -> tuple[str, str]:
     return found
 
 
-def _access(descriptor: int, folder: Path) -> str:
+def _access(descriptor: int, folder: int) -> str:
     """Users besides root who could change it; empty: none."""
-    file, parent, me = os.fstat(descriptor), folder.stat(), os.geteuid()
+    file, parent, me = os.fstat(descriptor), os.fstat(folder), os.geteuid()
     if not stat.S_ISREG(file.st_mode):
         return "no regular file"
     if file.st_uid != me or parent.st_uid not in (0, me):
@@ -215,8 +228,8 @@ def _access(descriptor: int, folder: Path) -> str:
     return ""
 
 
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+def _sync(folder: int) -> None:
+    descriptor = os.open(".", os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC, dir_fd=folder)
     try:
         os.fsync(descriptor)
     finally:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import stat
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+
+from canbase_watchdog.own_folder import open_own_folder
 
 BATCH = 64
 """Datagrams taken in before the loop looks at the clock again."""
@@ -34,25 +37,32 @@ class LeaseSocket:
                 "the user of the safety filter, and leave lease.uid out for the latter"
             )
         try:
-            self._path.parent.mkdir(mode=0o755 if foreign else 0o700, parents=True, exist_ok=True)
-            _check_folder(self._path.parent)
-            _remove_stale(self._path)
-            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self._folder = open_own_folder(self._path.parent, 0o755 if foreign else 0o700)
+        except OSError as error:
+            raise LeaseSocketError(f"lease socket {path}: {error}. Check lease.socket") from error
+        name, self._socket = self._path.name, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            self._remove_stale()
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
             self._socket.setblocking(False)
-            self._socket.bind(path)
-            self._path.chmod(0o600)
-            if foreign:
-                os.chown(path, uid, -1)  # no other user can fill its queue
+            os.fchmod(self._socket.fileno(), 0o600)  # before `bind`: the file has this mode from its first moment
+            self._socket.bind(self._place)
+            if foreign:  # no other user can fill its queue
+                os.chown(name, uid, -1, dir_fd=self._folder, follow_symlinks=False)
         except OSError as error:
+            self._close()
             raise LeaseSocketError(f"the lease socket {path} cannot be bound: {error}. Check lease.socket.") from error
+        except LeaseSocketError:
+            self._close()
+            raise
 
     def __enter__(self) -> LeaseSocket:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._socket.close()
-        self._path.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(self._path.name, dir_fd=self._folder)
+        self._close()
 
     def fileno(self) -> int:
         """What to wait on with select."""
@@ -67,6 +77,32 @@ class LeaseSocket:
                 return
             yield datagram, *_sender(ancillary)
 
+    @property
+    def _place(self) -> str:
+        """By the descriptor of the folder: bind(2) and connect(2) take no `dir_fd`."""
+        return f"/proc/self/fd/{self._folder}/{self._path.name}"
+
+    def _close(self) -> None:
+        self._socket.close()
+        os.close(self._folder)
+
+    def _remove_stale(self) -> None:
+        """Remove what a killed watchdog left behind. Raises LeaseSocketError when another process uses the path."""
+        name, path = self._path.name, self._path
+        try:
+            found = os.stat(name, dir_fd=self._folder, follow_symlinks=False)
+        except FileNotFoundError:
+            return
+        if not stat.S_ISSOCK(found.st_mode):
+            raise LeaseSocketError(f"{path} is not a socket. Remove it, or choose another lease.socket.")
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.connect(self._place)
+            except ConnectionRefusedError:
+                os.unlink(name, dir_fd=self._folder)
+                return
+        raise LeaseSocketError(f"another watchdog listens on {path}. End it, or choose another lease.socket.")
+
 
 def _sender(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, int | None]:
     for level, kind, data in ancillary:
@@ -74,35 +110,3 @@ def _sender(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, int | 
             pid, uid, _ = _CREDENTIALS.unpack(data)
             return int(uid), int(pid)
     return None, None
-
-
-def _check_folder(folder: Path) -> None:
-    """A user who may change the folder of the socket can put another socket in its place. Raises LeaseSocketError."""
-    link, found = folder.lstat(), folder.stat()
-    if stat.S_ISLNK(link.st_mode) and link.st_uid not in (0, os.geteuid()):
-        raise LeaseSocketError(f"the folder {folder} of the lease socket is a link of user {link.st_uid}. Remove it")
-    if found.st_uid not in (0, os.geteuid()):
-        raise LeaseSocketError(
-            f"the folder {folder} of the lease socket belongs to user {found.st_uid}, this is user {os.geteuid()}: "
-            "that user could take its place. Choose another lease.socket, in a folder of this user"
-        )
-    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX:
-        raise LeaseSocketError(
-            f"others may write to the folder {folder} of the lease socket, and so take its place. "
-            f"Take that from them (chmod go-w {folder}), or choose another lease.socket"
-        )
-
-
-def _remove_stale(path: Path) -> None:
-    """Remove what a killed watchdog left behind. Raises LeaseSocketError when somebody uses the path."""
-    if not path.exists():
-        return
-    if not stat.S_ISSOCK(path.stat().st_mode):
-        raise LeaseSocketError(f"{path} is not a socket. Remove it, or choose another lease.socket.")
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(str(path))
-        except ConnectionRefusedError:
-            path.unlink()
-            return
-    raise LeaseSocketError(f"another watchdog listens on {path}. End it, or choose another lease.socket.")

@@ -87,7 +87,7 @@ def test_the_records_belong_to_the_user_who_made_them(tmp_path: Path) -> None:
 
 def test_what_that_user_may_not_do_is_reported_with_its_reason(tmp_path: Path) -> None:
     (tmp_path / "lib").write_text("no folder")
-    with pytest.raises(FileExistsError, match=r"File exists: .*/lib"):
+    with pytest.raises(NotADirectoryError, match=r"Not a directory: .*/lib"):
         first_records(tmp_path / "lib" / "robot", "carl", ME)
 
 

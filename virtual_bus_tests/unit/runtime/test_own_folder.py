@@ -1,0 +1,187 @@
+"""Folders that another user could change are refused, at every place of a path; both copies of the module."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import socket
+from pathlib import Path, PurePosixPath
+from types import ModuleType
+
+import pytest
+
+from canbase_deploy.actions import Link, Remove, WriteFile
+from canbase_deploy.execute import ExecuteError, Executor, first_records
+from canbase_runtime import own_folder as of_all
+from canbase_runtime.latch_file import LatchFile, create_first
+from canbase_runtime.latch_record import Defect, Record
+from canbase_watchdog import latch, latch_file
+from canbase_watchdog import own_folder as of_watchdog
+from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
+
+STRANGER = 12345
+
+
+@pytest.fixture(params=[of_all, of_watchdog], ids=["runtime", "watchdog"])
+def module(request: pytest.FixtureRequest) -> ModuleType:
+    assert isinstance(request.param, ModuleType)
+    return request.param
+
+
+def test_both_copies_have_the_same_text() -> None:
+    """What is corrected in one is corrected in the other."""
+    assert Path(of_all.__file__).read_text() == Path(of_watchdog.__file__).read_text()
+
+
+def test_folders_are_made_with_the_mode_and_a_name_that_is_missing_is_an_error(
+    module: ModuleType, tmp_path: Path
+) -> None:
+    path = tmp_path / "a" / "b"
+    with pytest.raises(FileNotFoundError):
+        module.open_own_folder(path)
+    os.close(module.open_own_folder(path, 0o700))
+    assert path.stat().st_mode & 0o777 == path.parent.stat().st_mode & 0o777 == 0o700
+    (tmp_path / "file").touch()
+    before = len(os.listdir("/proc/self/fd"))
+    with pytest.raises(NotADirectoryError) as raised:
+        module.open_own_folder(tmp_path / "file" / "b", 0o700)
+    assert raised.value.filename == str(tmp_path / "file")
+    os.close(module.open_own_folder(path))
+    assert len(os.listdir("/proc/self/fd")) == before
+    os.close(module.open_own_folder(Path("/")))
+
+
+@pytest.mark.parametrize("deep", [0, 1, 2])
+@pytest.mark.parametrize(("mode", "fine"), [(0o755, True), (0o757, False), (0o1777, True)])
+def test_a_folder_that_everybody_may_write(
+    module: ModuleType, tmp_path: Path, deep: int, mode: int, *, fine: bool
+) -> None:
+    """At each depth above, and itself. In one with the sticky bit others cannot move what is not theirs."""
+    path = tmp_path / "a" / "b" / "c"
+    path.mkdir(parents=True)
+    [path, *path.parents][deep].chmod(mode)
+    if fine:
+        os.close(module.open_own_folder(path))
+        return
+    with pytest.raises(module.FolderError, match=f"chmod go-w {[path, *path.parents][deep]}"):
+        module.open_own_folder(path)
+
+
+@pytest.mark.needs_root("give a folder to another group")
+@pytest.mark.parametrize(
+    ("group", "above", "fine"), [(0, True, True), (STRANGER, True, False), (0, False, False)], ids=str
+)
+def test_a_folder_that_a_group_may_write(
+    module: ModuleType, tmp_path: Path, group: int, *, above: bool, fine: bool
+) -> None:
+    """Of the folders above only with the group of root, or the own group of the owner (umask 002)."""
+    path = tmp_path / "a" / "b"
+    path.mkdir(parents=True)
+    changed = path.parent if above else path
+    os.chown(changed, -1, group)
+    changed.chmod(0o775)
+    with contextlib.nullcontext() if fine else pytest.raises(module.FolderError, match="others may write"):
+        os.close(module.open_own_folder(path))
+
+
+@pytest.mark.needs_root("give a folder to another user")
+@pytest.mark.parametrize("deep", [0, 1, 2])
+def test_a_folder_of_another_user(module: ModuleType, tmp_path: Path, deep: int) -> None:
+    path = tmp_path / "a" / "b" / "c"
+    path.mkdir(parents=True)
+    os.chown([path, *path.parents][deep], STRANGER, -1)
+    with pytest.raises(module.FolderError, match=f"belongs to user {STRANGER}"):
+        module.open_own_folder(path / "new" if deep == 0 else path, 0o700)
+    assert not (path / "new").exists()
+
+
+def test_own_links_are_followed(module: ModuleType, tmp_path: Path) -> None:
+    """As /var/run is one: absolute, relative, with dots; a ring ends."""
+    (tmp_path / "there" / "in").mkdir(parents=True)
+    (tmp_path / "one").symlink_to(tmp_path / "there")
+    (tmp_path / "there" / "two").symlink_to("../there/./in")
+    found = module.open_own_folder(tmp_path / "one" / "two")
+    assert os.path.samestat(os.fstat(found), (tmp_path / "there" / "in").stat())
+    os.close(found)
+    (tmp_path / "ring").symlink_to("ring")
+    with pytest.raises(OSError, match="too many links") as raised:
+        module.open_own_folder(tmp_path / "ring")
+    assert raised.value.errno == errno.ELOOP
+
+
+@pytest.mark.needs_root("give a link to another user")
+def test_a_link_of_another_user(module: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "there")
+    os.lchown(tmp_path / "link", STRANGER, -1)
+    with pytest.raises(module.FolderError, match=f"{tmp_path}/link is a link of user {STRANGER}. Remove it"):
+        module.open_own_folder(tmp_path / "link" / "new", 0o700)
+    assert not list((tmp_path / "there").iterdir())
+
+
+@pytest.fixture
+def taken(tmp_path: Path) -> Path:
+    """A folder of another user above that of this one; the user can replace the lower one at any moment."""
+    folder = tmp_path / "users" / "run"
+    folder.mkdir(parents=True)
+    os.chown(folder.parent, STRANGER, -1)
+    return folder
+
+
+@pytest.mark.needs_root("give a folder to another user")
+def test_nothing_is_done_as_root_in_the_folder_of_another_user(taken: Path, tmp_path: Path) -> None:
+    """The lease socket, both writers of records, the first records and what `canbase install` writes."""
+    with pytest.raises(LeaseSocketError, match=f"belongs to user {STRANGER}"):
+        LeaseSocket(str(taken / "lease"), os.getuid())
+    file = LatchFile(taken / "carl", "driver", "carl")
+    assert file.open().defect is Defect.ACCESS
+    with pytest.raises(OSError, match=f"belongs to user {STRANGER}"):
+        file.write(Record())
+    keeper = latch_file.Keeper(taken / "watchdog.latch", "carl")
+    assert keeper.past.latched
+    assert f"belongs to user {STRANGER}" in keeper.past.problem
+    keeper.start()
+    keeper.want(latch.Entry())
+    assert not keeper.finish(5.0)
+    with pytest.raises(OSError, match=f"belongs to user {STRANGER}"):
+        create_first(taken / "state" / "carl", "carl")
+    with pytest.raises(OSError, match=f"belongs to user {STRANGER}"):
+        first_records(taken / "state" / "carl", "carl", "root")
+    assert not list(taken.iterdir())
+
+
+@pytest.mark.needs_root("install")
+def test_an_installation_does_not_write_below_the_folder_of_another_user(taken: Path) -> None:
+    """The plan's folders belong to root on every system; where one does not, the first file is refused."""
+    (taken / "there").write_text("kept")
+    said: list[str] = []
+    executor = Executor(Path("/"), said.append)
+    place = PurePosixPath(str(taken))
+    for action in (WriteFile(place / "new", "x"), Link(place / "link", "x"), Remove(place / "there")):
+        with pytest.raises(ExecuteError, match=f"belongs to user {STRANGER}"):
+            executor.carry_out([action])
+    assert [path.name for path in taken.iterdir()] == ["there"]
+
+
+def test_the_socket_has_its_mode_from_its_first_moment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Under any umask; it is reached by its path."""
+    before = os.umask(0)
+    try:
+        bind = socket.socket.bind
+        seen: list[int] = []
+
+        class Watched(socket.socket):
+            def bind(self, address: object) -> None:
+                bind(self, address)  # type: ignore[arg-type]
+                seen.append((tmp_path / "lease").stat().st_mode & 0o777)
+
+        monkeypatch.setattr(socket, "socket", Watched)
+        with LeaseSocket(str(tmp_path / "lease"), os.getuid()) as leases:
+            sender = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            sender.sendto(b"x", str(tmp_path / "lease"))
+            assert [data for data, *_ in leases.receive()] == [b"x"]
+            sender.close()
+    finally:
+        os.umask(before)
+    assert seen == [0o600]

@@ -1,0 +1,98 @@
+"""A folder that only root and this user can change or replace: every folder above it too, from the top.
+
+A process that works by path in a folder of another user opens, replaces and gives away whatever that user puts there.
+So the path is walked with descriptors, and each folder on it is judged before the next one is opened or made in it.
+Where every folder is trusted, no other user can move one of them afterwards. There are two copies of this file with the
+same text: the watchdog shares no code.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+MOST_LINKS = 40
+"""In one path, as the kernel has it."""
+_OPEN = os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+class FolderError(OSError):
+    """Another user could change the folder or take its place."""
+
+    def __init__(self, text: str) -> None:
+        """`text`: the folder, the reason and the remedy."""
+        super().__init__(errno.EACCES, text)
+
+    def __str__(self) -> str:
+        return str(self.strerror)
+
+
+def open_own_folder(path: Path, mode: int | None = None) -> int:
+    """A descriptor of the folder `path`, for `dir_fd`. `mode`: folders that do not exist are made, with this mode.
+
+    Links of root and of this user are followed. Raises FolderError, or another OSError.
+    """
+    parts = [*path.absolute().parts[1:]]
+    descriptor, place, links = os.open("/", _OPEN), Path("/"), 0
+    try:
+        _judge(os.fstat(descriptor), place, last=not parts)
+        while parts:
+            part = parts.pop(0)
+            place /= part
+            target = _link(part, descriptor, place, make=mode)
+            if target is None:
+                below = os.open(part, _OPEN, dir_fd=descriptor)
+                os.close(descriptor)
+                descriptor = below
+                _judge(os.fstat(descriptor), place, last=not parts)
+                continue
+            links += 1
+            if links > MOST_LINKS:
+                raise OSError(errno.ELOOP, f"too many links in {path}")
+            parts[:0] = [name for name in target.split("/") if name]
+            place = place.parent
+            if target.startswith("/"):
+                os.close(descriptor)
+                descriptor, place = os.open("/", _OPEN), Path("/")
+    except BaseException as error:
+        os.close(descriptor)
+        if isinstance(error, OSError) and error.filename:
+            error.filename = str(place)
+        raise
+    return descriptor
+
+
+def _link(name: str, folder: int, place: Path, make: int | None) -> str | None:
+    """The target of a link; None: it is none. What does not exist is made, with the mode `make`."""
+    try:
+        found = os.stat(name, dir_fd=folder, follow_symlinks=False)
+    except FileNotFoundError:
+        if make is None:
+            raise
+        os.mkdir(name, make, dir_fd=folder)
+        return None
+    if not stat.S_ISLNK(found.st_mode):
+        return None
+    if found.st_uid not in (0, os.geteuid()):
+        raise FolderError(f"the folder {place} is a link of user {found.st_uid}. Remove it")
+    return os.readlink(name, dir_fd=folder)
+
+
+def _judge(found: os.stat_result, place: Path, *, last: bool) -> None:
+    """Refuses a folder that another user could change. In one with the sticky bit a user moves only files of that user.
+
+    Above the last one a group may write that is root's, or that by its number is its owner's own (umask 002).
+    """
+    if found.st_uid not in (0, os.geteuid()):
+        raise FolderError(
+            f"the folder {place} belongs to user {found.st_uid}, this is user {os.geteuid()}: "
+            "that user could take its place. Choose a folder of this user"
+        )
+    others = stat.S_IWOTH if not last and found.st_gid in (0, found.st_uid) else stat.S_IWGRP | stat.S_IWOTH
+    if found.st_mode & others and not found.st_mode & stat.S_ISVTX:
+        raise FolderError(
+            f"others may write to the folder {place}, and so take the place of what is in it. "
+            f"Take that from them (chmod go-w {place}), or choose another folder"
+        )
