@@ -59,7 +59,10 @@ def never() -> bool:
 
 
 class GoalClient(Generic[ResultT, FeedbackT]):
-    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
+    """Sends goals from `node`, which `executor` spins, else the one that the node is in, else one for this client.
+
+    Nothing else may spin the node while a method here waits.
+    """
 
     def __init__(
         self,
@@ -87,8 +90,9 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             result_service_qos_profile=SERVICE_QOS,
             cancel_service_qos_profile=SERVICE_QOS,
         )
-        self._executor = executor or SingleThreadedExecutor(context=node.context)
-        if executor is None:
+        shared = executor or node.executor  # a second executor would take the node away from the first client
+        self._executor: Executor = shared or SingleThreadedExecutor(context=node.context)
+        if shared is None:
             self._executor.add_node(node)
             node.context.on_shutdown(self._end)
         self._feedback_timeout_s = feedback_timeout_s

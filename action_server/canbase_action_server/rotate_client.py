@@ -43,7 +43,7 @@ Turn = SentGoal[RotateResult]
 
 
 class RotateClient(GoalClient[RotateResult, RotateFeedback]):
-    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
+    """Sends goals from `node`, as GoalClient does: nothing else may spin it while a method here waits."""
 
     def __init__(
         self,

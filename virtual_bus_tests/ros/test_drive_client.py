@@ -13,9 +13,12 @@ import pytest
 from canbase.action import DriveDistance
 from canbase.msg import DriverStatus
 from rclpy.action import ActionClient
+from rclpy.node import Node
 
 from canbase_action_server.action_servers import actions_of
 from canbase_action_server.client import DriveClient, NoResponseError, NoServerError, RejectedError, ServerLostError
+from canbase_action_server.outcome import Status
+from canbase_action_server.rotate_client import RotateClient
 from ros.conftest import MakeRobot, Spawn
 from support.fake_base import FakeBase, server_code
 from support.ros_harness import Process, TestNode
@@ -194,6 +197,7 @@ DEAF_CLIENT = """
 import time, rclpy
 from canbase.action import DriveDistance
 from rclpy.action import ActionClient
+from rclpy.node import Node
 rclpy.init()
 node = rclpy.create_node("deaf")
 client = ActionClient(node, DriveDistance, "drive_distance")
@@ -258,6 +262,24 @@ def test_a_client_that_ends_before_the_acceptance_leaves_its_cancel_behind(test_
     assert "accepted" not in server.log()
     test_node.wait_for(lambda: "cancel requested" in server.log(), 5.0, "the cancel, after the acceptance")
     assert server.log().index("accepted") < server.log().index("cancel requested")
+
+
+def test_clients_share_the_executor_of_their_node(stage: Stage) -> None:
+    drive, rotate, other = (kind(stage.node.node) for kind in (DriveClient, RotateClient, DriveClient))
+    for client in (drive, other):
+        result = client.send(0.2, 0.3).wait(20.0)
+        assert result is not None
+        assert result.status is Status.SUCCEEDED
+    with pytest.raises(RejectedError):
+        rotate.send(1.0, 99.0)
+
+
+def test_clients_on_a_node_without_an_executor_share_one(test_node: TestNode) -> None:
+    node = Node("application", context=test_node.node.context)
+    first, second = DriveClient(node), RotateClient(node)
+    assert node.executor is not None
+    assert first._executor is second._executor is node.executor
+    node.destroy_node()
 
 
 def test_no_server_is_an_error_of_its_own(test_node: TestNode) -> None:
