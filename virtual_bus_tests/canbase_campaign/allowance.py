@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from canbase_campaign.envelope import Envelope
 from canbase_campaign.excuses import Ledger
+from canbase_hazards.stated_times import DISABLE_VOLTAGE_S, PRE_OPERATIONAL_S, QUICK_STOP_S
 
-LADDER_S = 0.15 + 0.15 + 0.1
+LADDER_S = QUICK_STOP_S + PRE_OPERATIONAL_S + DISABLE_VOLTAGE_S
 """The first three rungs of the watchdog's ladder (docs/bus.md), of which a second master may undo each."""
 
 

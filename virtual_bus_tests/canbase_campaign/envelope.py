@@ -9,20 +9,17 @@ from __future__ import annotations
 
 import math
 
+from canbase_campaign import judged_by
+from canbase_campaign.judged_by import CYCLES, MESSAGE_S, jerk_adds_s
 from canbase_campaign.robots import DrawnRobot, rolls_out
 from canbase_config.robot import Robot
-from canbase_config.stopping import jerk_adds_s, max_wheel_mps
 
 TICK_S = 0.005
 """Of the watchdog, and of the drives' own timers."""
 BUS_S = 0.03
 """A frame that waits for its turn, and one that is lost."""
-CYCLES = 2.0
-"""An order waits for the driver's next cycle, and its end is seen in the one after."""
 ORDER_S = 0.05
 """An order is renewed every 20 ms (rates.command_hz)."""
-OVERSHOOT_MPS = 0.006
-"""Of a drive's velocity loop, on top of watchdog.target_tolerance."""
 ROUNDING_S = 1e-9
 ROLLS_S = 0.002
 """Of τ: what a wheel that rolls out from one step to the next may differ by; 1 mm/s at 0.5 m/s²."""
@@ -32,12 +29,11 @@ class _Numbers:
     """Of one robot, computed once: they are needed at every step."""
 
     def __init__(self, robot: Robot) -> None:
-        watchdog, t, limits = robot.watchdog, robot.timeouts, robot.limits
+        t, limits = robot.timeouts, robot.limits
         self.robot = robot
-        share_mps = watchdog.target_tolerance_share * max_wheel_mps(robot)
-        self.tolerance_mps = watchdog.target_tolerance_mps + share_mps + OVERSHOOT_MPS
+        self.tolerance_mps = judged_by.tolerance_mps(robot)
         self.tolerance_radps = 2.0 * self.tolerance_mps / robot.base.track_m
-        hold_s = t.command_s + CYCLES / robot.rates.control_hz + watchdog.latency_s
+        hold_s = t.command_s + CYCLES / robot.rates.control_hz + MESSAGE_S
         self.notice_s = max(hold_s, t.lease_s, t.watchdog_s, t.drive_heartbeat_s) + TICK_S + BUS_S
         self.deceleration_mps2 = limits.deceleration_mps2
         self.angular_deceleration_radps2 = limits.angular_deceleration_radps2

@@ -91,8 +91,8 @@ EXCUSES = {
         "a drive that starts again counts from another place: what its wheel rolled meanwhile is known to nobody", 1.0
     ),
     "unread": Excuse(
-        "a driver without a line from a drive cannot know whether that one began to count anew meanwhile: it publishes "
-        "no pose, counts the loss in pose_resets, and goes on from the last one",
+        "a driver without a line from a drive cannot know whether that one counts anew: it counts the "
+        "loss in pose_resets, and goes on from the last pose",
         math.inf,
     ),
     "unasked": Excuse(
@@ -125,13 +125,14 @@ class Faults:
             for fault in plan.faults
             if fault.name not in HARMLESS
         ]  # fmt: skip
-        self._overlap_at = self._one_at = -math.inf
+        self.overlap_at = self._one_at = -math.inf
+        """When two of them held last, or one."""
 
     def step(self, now_s: float) -> None:
         """To be called every step."""
         holding = sum(begin_s <= now_s < end_s for begin_s, end_s in self._spans)
         self._one_at = now_s if holding else self._one_at
-        self._overlap_at = now_s if holding > 1 else self._overlap_at
+        self.overlap_at = now_s if holding > 1 else self.overlap_at
 
     def one(self, now_s: float) -> bool:
         """One holds, or did so less than one reaction ago."""
@@ -139,7 +140,7 @@ class Faults:
 
     def overlap(self, now_s: float) -> bool:
         """Two hold, or did so less than one reaction ago."""
-        return now_s <= self._overlap_at + self._react_s
+        return now_s <= self.overlap_at + self._react_s
 
     def on_reset(self, now_s: float) -> None:
         """An accepted reset: the cause of each latch is over."""

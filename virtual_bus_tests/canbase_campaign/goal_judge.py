@@ -7,11 +7,11 @@ import math
 from canbase_campaign.action_process import Goal
 from canbase_campaign.allowance import is_late
 from canbase_campaign.excuses import Ledger
+from canbase_campaign.judged_by import CYCLES, lag_s, max_wheel_mps
 from canbase_campaign.odometry_judge import FLOOR_M, SHARE, Place, true_place
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
-from canbase_config.state_age import STATE_PERIOD_S, state_timeout_s
-from canbase_config.stopping import lag_s, max_wheel_mps, standstill_s
+from canbase_hazards.stated_times import STATE_LOST_S, STATE_PERIOD_S, stated_s
 from canbase_velocity.twist import Twist
 
 STEP_S = 0.01
@@ -25,6 +25,7 @@ class GoalJudge:
 
     def __init__(self, world: World, shown: Shown, ledger: Ledger) -> None:
         self._world, self._shown, self._ledger = world, shown, ledger
+        self._lag_s = CYCLES / world.robot.rates.control_hz + lag_s(world.drawn.body)
         self._from: dict[int, Place] = {}
         """Where the base truly was when a goal began; a goal during which an encoder lies is not compared."""
         sources = world.robot.mux.sources.values()
@@ -59,9 +60,9 @@ class GoalJudge:
 
     def _ends_s(self, goal: Goal) -> float:
         """A state arrives with the next publication, or is missed; then the goal brakes to standstill."""
-        robot, limits = self._world.robot, self._world.robot.limits
+        limits = self._world.robot.limits
         brakes_s = goal.speed_mps / limits.deceleration_mps2 + limits.deceleration_mps2 / limits.jerk_mps3
-        return STATE_PERIOD_S + state_timeout_s() + lag_s(robot) + brakes_s + goal.held_up_s
+        return STATE_PERIOD_S + STATE_LOST_S + self._lag_s + brakes_s + goal.held_up_s
 
     def step(self, locked: bool) -> None:
         """Now. `locked`: a lock of the mux holds that it can know of."""
@@ -101,7 +102,11 @@ class GoalJudge:
         robot = self._world.robot
         ramps_s = goal.speed_mps * (1.0 / robot.limits.acceleration_mps2 + 1.0 / robot.limits.deceleration_mps2) + 0.5
         ideal_s = abs(goal.distance_m) / goal.speed_mps + ramps_s
-        return robot.action.overall_factor * ideal_s + robot.action.overall_extra_s + standstill_s(robot)
+        return (
+            robot.action.overall_factor * ideal_s
+            + robot.action.overall_extra_s
+            + stated_s("wheels_turn_after_zero", robot)
+        )
 
     def _beside(self, goal: Goal) -> str:
         """By its own report, and by the ground truth."""

@@ -22,24 +22,22 @@ from canbase_campaign.envelope import (
 )
 from canbase_campaign.excuses import STEP_S, Faults, Ledger
 from canbase_campaign.goal_judge import GoalJudge
+from canbase_campaign.judged_by import CYCLES, MESSAGE_S, jerk_adds_s, lag_s, max_wheel_mps
 from canbase_campaign.motion_judge import MotionJudge
 from canbase_campaign.odometry_judge import OdometryJudge
 from canbase_campaign.outside import Outside, Surroundings
 from canbase_campaign.planned import Plan
 from canbase_campaign.reach import BRAKES_S, Reach
+from canbase_campaign.robots import DrawnRobot
 from canbase_campaign.short_judge import ShortJudge
 from canbase_campaign.shown import Shown
 from canbase_campaign.strangers import SENT_S, Strangers
 from canbase_campaign.wishes import Wishes
 from canbase_campaign.world import World
-from canbase_config.robot import Robot
-from canbase_config.stopping import jerk_adds_s, lag_s, max_wheel_mps
+from canbase_hazards.stated_times import QUICK_STOP_S
 from canbase_sim.cia402.states import State
 from canbase_velocity.twist import ZERO, Twist
 
-OBEY_S = 0.15
-"""A base that starts just when something is latched goes on until the stop has reached its drives: the first rung of
-docs/bus.md."""
 RAMP_LATE_S = 0.3
 """One drive of several may still be on its own ramp, when the others that held it have released."""
 ROUNDING_S = 0.002
@@ -56,9 +54,10 @@ FOUND_S = 0.6
 """After its start a process has found the publishers of a topic."""
 
 
-def longest_lag_s(robot: Robot) -> float:
+def longest_lag_s(drawn: DrawnRobot) -> float:
     """From an order of the filter until the wheels brake, the soft begin of the ramp included [s]."""
-    return robot.safety.reaction_s + lag_s(robot) + jerk_adds_s(robot.limits)
+    rates, limits = drawn.robot.rates, drawn.robot.limits
+    return MESSAGE_S + CYCLES / rates.control_hz + lag_s(drawn.body) + jerk_adds_s(limits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +86,7 @@ class Judge:
         self._envelope = self._allowance("envelope", self._one_s)
         self._wishes = Wishes(world.robot, now_s)
         self._wish = self._allowance("sources", self._one_s + world.robot.safety.command_timeout_s)
-        sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.scan_s + longest_lag_s(world.robot)
+        sees_s = world.robot.safety.scan.timeout_s + 2.0 * around.scan_s + longest_lag_s(world.drawn)
         self._blind = self._allowance("blind", sees_s)
         self._touched = False
         self._leased, self._leased_at = ZERO, -math.inf
@@ -248,6 +247,7 @@ class Judge:
             "strange hands": self._was_pushed(),
             "lying sensor": self._motion.ran_away,
             "turned away": self._around.turned_rad > TURNED_RAD,
+            "second fault": self._faults.overlap_at >= self._around.wall_at - self._one_s,
         }
         row = next((row for row, holds in rows.items() if holds), "")
         return bool(row) and not self._orders_into(blind, now_s) and self.ledger.excuse("obstacle", row)
@@ -275,7 +275,7 @@ class Judge:
         base = self._world.drives.bench.base
         rests = moving_s(self._world.robot, base.v_mps, base.w_radps) == 0.0
         stands = tau_s == 0.0 and rests
-        self._stood = self._stood or (stands and now_s >= self._latched_at + OBEY_S)
+        self._stood = self._stood or (stands and now_s >= self._latched_at + QUICK_STOP_S)
         beyond = tau_s > self._hold.bound_s(tau_s, now_s, self._active) and not self._on_its_ramp(tau_s, now_s)
         if beyond or self._again(tau_s, rests, now_s):
             self._violate("held", f"{self._shown} while {' and '.join(self._latches)} latched")

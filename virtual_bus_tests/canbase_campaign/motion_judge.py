@@ -4,62 +4,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
-from math import sqrt
 
 from canbase_campaign.allowance import is_late
 from canbase_campaign.envelope import notice_s
 from canbase_campaign.excuses import Ledger
+from canbase_campaign.judged_by import Bounds, lag_s, ramp_s
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
-from canbase_config.robot import Robot
-from canbase_config.stopping import longest_ramp_s, max_wheel_mps
+from canbase_hazards.stated_times import stated_s
 from canbase_sim.cia402.states import State
 from canbase_velocity.twist import Twist
 
-OBEY_S = 0.15
-"""From the trip until the drives have obeyed: a rung of the watchdog's ladder."""
-JITTER_S = 0.05
-"""Cycles that are late, and the samples in a row that the watchdog wants."""
-CARRIED_SHARE = 0.2
-"""So much of its greatest speed a wheel may gain beyond the tolerances before it is noticed."""
 PATH_SHARE = 0.25
-"""... and turn faster by this share of what was ordered."""
+"""Beyond its bound the base may turn faster by this share of what was ordered."""
 STANDS_S = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class Allowed:
-    """What robot.yaml lets a wheel do before somebody has to act."""
-
-    remembered_s: float
-    """An order counts for this long: hold times of the layers, their reaction, and the ramp that follows the order."""
-    runaway_mps: float
-    """So much faster than the fastest that was ordered of it a wheel may be ..."""
-    runaway_s: float
-    """... and for how long, while it has power."""
-    path_radps: float
-    """So far beside what was ordered the base may turn, on top of PATH_SHARE ..."""
-    path_s: float
-    """... and for how long, while it has power."""
-    stands_mps: float
-    """A wheel that is faster for longer than STANDS_S is not at standstill, whatever is reported."""
-
-    @classmethod
-    def of(cls, robot: Robot) -> Allowed:
-        """The watchdog's tolerances and times, each with the lag of a drive and the time until the drives obey."""
-        watchdog, fastest_mps = robot.watchdog, max_wheel_mps(robot)
-        margin_mps = watchdog.motion_tolerance_mps + watchdog.motion_tolerance_share * fastest_mps
-        ways_s = sqrt(2.0 * watchdog.motion_missing_m / robot.limits.acceleration_mps2)
-        acts_s = watchdog.drive_lag_s + JITTER_S + OBEY_S
-        return cls(
-            notice_s(robot) + longest_ramp_s(robot),
-            margin_mps + CARRIED_SHARE * fastest_mps,
-            max(watchdog.motion_missing_s, ways_s) + acts_s,
-            2.0 * margin_mps / robot.base.track_m,
-            max(watchdog.twist_s, watchdog.slow_wheel_s, watchdog.motion_missing_s) + acts_s + watchdog.drive_lag_s,
-            margin_mps + 0.02,
-        )
 
 
 class Greatest:
@@ -97,7 +55,11 @@ class MotionJudge:
         self._ledger = ledger
         self._world, self._half_m = world, world.robot.base.track_m / 2.0
         self._shown = shown
-        self._allowed = Allowed.of(world.robot)
+        robot, limits = world.robot, world.robot.limits
+        self._allowed = Bounds.of(robot)
+        ramp = ramp_s(limits, limits.linear_mps, limits.angular_radps) + lag_s(world.drawn.body)
+        self._remembered_s = notice_s(robot) + ramp
+        """An order counts for this long: the layers notice its end, and its ramp follows."""
         now_s = world.clock.now_s
         self._ordered_at: deque[float] = deque()
         self._wheel, self._left, self._right = Greatest(), Greatest(), Greatest()
@@ -107,7 +69,7 @@ class MotionJudge:
         self._before_mps, self._lost = 0.0, False
         self._heartbeat_s = world.robot.timeouts.drive_heartbeat_s
         self._watchdog_s = world.robot.timeouts.watchdog_s
-        self._impulse_s = world.robot.watchdog.stand_impulse_s + JITTER_S
+        self._impulse_s = stated_s("dead_encoder_after_a_tap", robot)
         self._unasked_at = self._unwatched_at = -math.inf
         self.ran_away = False
         """Since the base last stood, some wheel was faster than ordered, or the base turned otherwise: `runaway` and
@@ -131,7 +93,7 @@ class MotionJudge:
         `lost`: no process reaches a drive that turns; one that does again has its time from there on.
         """
         self._lost = lost
-        while len(self._ordered_at) > 1 and self._ordered_at[1] < now_s - self._allowed.remembered_s:
+        while len(self._ordered_at) > 1 and self._ordered_at[1] < now_s - self._remembered_s:
             self._ordered_at.popleft()
             for greatest in (self._wheel, self._left, self._right):
                 greatest.drop()

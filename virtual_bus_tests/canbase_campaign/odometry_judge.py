@@ -3,8 +3,8 @@
 From the first one of a driver's life on, in motion too. What the driver says about its own pose counts for nothing: a
 pose that it publishes is one that others follow. A new comparison begins where the truth says that no encoder could
 know: an encoder lied, a second drive answered with the same node id, a drive's counter began anew; or the driver had no
-line from a drive, published nothing meanwhile, and counts the loss in `pose_resets`: it cannot know whether that drive
-began to count anew, and whoever follows the pose can know that travel is missing.
+line from a drive, and counts the loss in `pose_resets`: it cannot know whether that drive began to count anew, and
+whoever follows the pose can know that travel is missing.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from canbase_campaign.excuses import STEP_S, Ledger
+from canbase_campaign.judged_by import max_wheel_mps
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
-from canbase_config.stopping import max_wheel_mps
 from canbase_sim.cia301.nmt import NmtState
 
 BRAKES_MPS = 0.2
@@ -69,8 +69,8 @@ class OdometryJudge:
         """How long the newest sample may be one of a faulty encoder, or from before a counter began anew."""
         self._read_at = dict.fromkeys(world.drives.bench.nodes, world.clock.now_s)
         """When the driver had a line from each drive last."""
-        self._missed_at, self._gap_s = -math.inf, 2.5 / world.robot.rates.odometry_hz
-        """When one of them was last missing for longer than the newest sample may be old."""
+        self._missed_at = -math.inf
+        """When one was last missing for longer than the newest sample may be old, or the adapter took nothing."""
         self._axes = [world.drives.axis(wheel) for wheel in range(len(world.robot.drives))]
         self._counters = self._counters_now()
         self._last: tuple[float, Place] | None = None
@@ -81,10 +81,10 @@ class OdometryJudge:
         self._beside = False
         """The newest pose needs that row."""
         self._gap_until, self._gap_unread_s = -math.inf, 0.0
-        self._resets, self._says_lost = 0, False
-        """Published beside the poses: how often travel is missing; it grew over the newest gap."""
+        self._resets = 0
+        """Published beside the poses: how often travel is missing."""
         self._unread_s = 0.0
-        """The base moved for so long while the driver had no line from a drive, since the last pose."""
+        """The base moved for so long while the driver had no line from a drive, since it last counted a loss."""
 
     def step(self, now_s: float) -> None:
         """What an encoder cannot know, also while the driver hangs: it reads the counts of that time later."""
@@ -108,7 +108,7 @@ class OdometryJudge:
             reads = world.driver.running and not world.driver.bus_problem
             if sends and reads and (f"drive{node_id}", "driver") not in blocked:
                 self._read_at[node_id] = now_s
-        if now_s > min(self._read_at.values()) + self._late_s:
+        if world.driver.bus_problem or now_s > min(self._read_at.values()) + self._late_s:
             self._missed_at = now_s
             self._unread_s += STEP_S * self._ledger.moves
 
@@ -120,20 +120,15 @@ class OdometryJudge:
         driver = self._world.driver
         if driver.core is not self._core:
             self._core, self._last, self._origins, self._resets = driver.core, None, None, 0
-        last_at = self._last[0] if self._last is not None else math.inf
         pose = snapshot.odometry.pose
         place = Place(pose.x_m, pose.y_m, pose.yaw_rad)
         problem = self._difference(place)
-        if last_at + self._gap_s < now_s and last_at <= self._missed_at + BOOTS_S:
-            self._gap_until, self._gap_unread_s = now_s + SHOWS_S, self._unread_s
         resets_before, self._resets = self._resets, snapshot.odometry.pose_resets
-        if last_at + self._gap_s < now_s:
-            self._says_lost = self._resets > resets_before
-        # it published nothing meanwhile, and then that travel is missing
-        if now_s <= self._gap_until and self._says_lost and (problem or self._heads_elsewhere(place)):
+        if self._resets > resets_before and now_s <= self._missed_at + BOOTS_S:
+            self._gap_until, self._gap_unread_s, self._unread_s = now_s + SHOWS_S, self._unread_s, 0.0
+        if now_s <= self._gap_until and (problem or self._heads_elsewhere(place)):
             self._ledger.add("odometry", "unread", self._gap_unread_s)
             self._gap_until, problem = -math.inf, self._restart(place)
-        self._unread_s = 0.0
         self._beside = bool(problem)
         return self._jump(place, now_s) or ("" if self._excused else problem)
 

@@ -7,17 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from canbase_campaign.envelope import react_s
 from canbase_campaign.planned import GoalRequest, Plan, Segment
 from canbase_campaign.scanner import Scanner
+from canbase_campaign.wall_place import far_enough_m
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_velocity.clearance import NOWHERE, Points
 from canbase_velocity.twist import Twist
 
-SPEEDING_UP_MPS = 0.2
-"""By so much the base may become faster until the wall is noticed."""
 NAN = Twist(math.nan, 0.3)
 BEAMS = 360
 PERIOD_S, ROOM = 0.1, 2.5
@@ -109,16 +107,9 @@ class Surroundings:
 
     def put_wall(self, margin_m: float) -> None:
         """A wall appears in both directions of travel, where the base can still stop before it."""
-        base, robot = self._world.drives.bench.base, self._world.robot
-        limits, safety = robot.limits, robot.safety
-        gentlest = limits.linear_mps**2 / (2.0 * (safety.slow_distance_m - safety.stop_distance_m))
-        braking_m = base.v_mps**2 / (2.0 * min(gentlest, limits.deceleration_mps2))
-        sees_s = react_s(robot, layers=2) + self.scan_s
-        if self.scanner is not None and self.scanner.lies:
-            sees_s = max(sees_s, react_s(robot, layers=1) + safety.scan.frozen_s + safety.scan.timeout_s)
-        noticing_m = (abs(base.v_mps) + SPEEDING_UP_MPS) * sees_s
+        base, lies = self._world.drives.bench.base, self.scanner is not None and bool(self.scanner.lies)
         self.wall_at = self._world.clock.now_s
-        self.wall_m = safety.padding_m + safety.stop_distance_m + braking_m + noticing_m + margin_m
+        self.wall_m = far_enough_m(self._world.robot, base.v_mps, self.scan_s, lies=lies) + margin_m
         self._wall_from_m, self._wall_from_rad = base.travel_m, base.turned_rad
 
     def take_wall(self) -> None:

@@ -11,6 +11,7 @@ import math
 
 from canbase_campaign.envelope import tolerance_mps
 from canbase_campaign.world import World
+from canbase_hazards.stated_times import stated_s
 from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia301.life_guarding import Life
 from canbase_sim.cia402.axis import Axis
@@ -19,14 +20,10 @@ from canbase_sim.node import SimulatedNode
 from canbase_sim.personality import GENERIC, PERSONALITIES
 from canbase_sim.plant.motor import Motor
 
-LAST_RUNGS_S = 0.1 + 0.1
-"""Disable voltage, and heartbeat withheld: docs/bus.md."""
 LEAST_SHARE = 0.5
 """A wheel that brakes with less of its stated deceleration does not brake as it must: docs/bus.md."""
 SATURATED = 0.95
 """With this share of the bus taken by the lowest identifier no frame of another one gets through."""
-RESETS_S = 0.2
-"""From the last rung of the watchdog's ladder until the drive is without power: feedback by SDO, late cycles [s]."""
 BRAKES_S = 0.3
 """A wheel that turns again after a stop is slow: its drive takes this long to brake it [s]."""
 
@@ -64,9 +61,7 @@ class Reach:
         """Since when each drive has power: it gets none before its settings are written."""
         self._reacts_since: dict[int, float] = {}
         """Drives in a fault reaction that their own sensor never ends; since when the watchdog reaches them."""
-        watchdog = world.robot.watchdog
-        found_s = max(watchdog.motion_missing_s, world.robot.timeouts.feedback_s) + watchdog.drive_lag_s
-        self._reset_s = found_s + LAST_RUNGS_S + RESETS_S
+        self._reset_s = stated_s("fault_reaction_on_a_lying_sensor", world.robot)
         self._least_mps2 = LEAST_SHARE * world.robot.limits.deceleration_mps2
         self._missed_s = world.robot.timeouts.watchdog_s
 

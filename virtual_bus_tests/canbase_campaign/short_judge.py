@@ -10,9 +10,10 @@ from __future__ import annotations
 from canbase_campaign.allowance import is_late
 from canbase_campaign.envelope import TICK_S, moving_s
 from canbase_campaign.excuses import STEP_S, Ledger
+from canbase_campaign.judged_by import CYCLES, hard_ramp_s, lag_s
 from canbase_campaign.shown import Shown
 from canbase_campaign.world import World
-from canbase_config.stopping import lag_s, ramp
+from canbase_hazards.stated_times import stated_s
 
 SHARE, FLOOR_M, FLOOR_RAD = 0.05, 0.01, 0.03
 """What the velocity loop of a drive is behind its ramp at the end: of the distance, and at low speeds."""
@@ -26,7 +27,8 @@ class ShortJudge:
     def __init__(self, world: World, shown: Shown, ledger: Ledger) -> None:
         self._world, self._shown, self._ledger = world, shown, ledger
         robot = world.robot
-        self._wait_s = TOPIC_S + lag_s(robot) + robot.watchdog.latency_s + TICK_S + STEP_S
+        chain_s = stated_s("estop_pressed", robot) + CYCLES / robot.rates.control_hz + lag_s(world.drawn.body)
+        self._wait_s = TOPIC_S + chain_s + TICK_S + STEP_S
         self.brakes = False
         """A command to brake hard has been received, and the base was not at standstill since."""
         self._since = self._from_mps = self._from_radps = self._went_m = self._turned_rad = 0.0
@@ -60,10 +62,10 @@ class ShortJudge:
 
     def _over_s(self) -> float:
         """Beyond what is allowed, in seconds at the speed of the beginning."""
-        braking = ramp(self._world.robot.limits, self._from_mps, self._from_radps, emergency=True)
+        braking_s = hard_ramp_s(self._world.robot.limits, self._from_mps, self._from_radps)
         ways = (
-            (self._went_m, self._from_mps, braking.distance_m, FLOOR_M),
-            (self._turned_rad, self._from_radps, braking.turn_rad, FLOOR_RAD),
+            (self._went_m, self._from_mps, self._from_mps * braking_s / 2.0, FLOOR_M),
+            (self._turned_rad, self._from_radps, self._from_radps * braking_s / 2.0, FLOOR_RAD),
         )
         return max(
             (went - self._wait_s * fastest - (1.0 + SHARE) * brakes - floor) / max(fastest, floor)

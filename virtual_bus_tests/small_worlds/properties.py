@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 from canbase_campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
+from canbase_campaign.judged_by import max_wheel_mps
 from canbase_campaign.wishes import Wishes
-from canbase_config.stopping import max_wheel_mps
+from canbase_hazards.stated_times import QUICK_STOP_S
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_velocity.twist import Twist
@@ -26,7 +27,7 @@ PROPERTIES = {
 }
 HEARD_S = 0.1
 """The button publishes at once that it is pressed."""
-OBEY_S = 0.15 + 2.0 * STEP_S
+OBEY_S = QUICK_STOP_S + 2.0 * STEP_S
 """A drive has braked by a quick stop after this: the first rung of docs/bus.md, and two steps."""
 RUNAWAY_MPS, RUNAWAY_S = 0.3, 0.5
 
