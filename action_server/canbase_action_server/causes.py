@@ -85,6 +85,9 @@ def _drive_fault(s: Situation) -> str | None:
 
 
 def _odometry_lost(s: Situation) -> str | None:
+    second = ODOMETRY.second_sender(s.inputs, s.now_s)
+    if second is not None:
+        return second
     if s.pose_was_reset:
         return "the pose of the odometry was reset during the goal, or missed some travel; send a new goal"
     if s.odometry_jumped:
@@ -121,7 +124,7 @@ def _off_course(s: Situation) -> str | None:
 def _lost(topic: StateTopic) -> Callable[[Situation], str | None]:
     def test(s: Situation) -> str | None:
         silence = topic.silence(s.robot, s.inputs, s.now_s)
-        return silence and f"{silence} Without it the server does not know {topic.unknown}; check with `canbase doctor`"
+        return silence and f"{silence} The server does not know {topic.unknown}; check with `canbase doctor`"
 
     return test
 

@@ -33,7 +33,7 @@ from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.outcome import ErrorCode, Outcome
 from canbase_action_server.preconditions import commanding_program, is_moving, state_reason
-from canbase_action_server.state_topics import STATE_TOPICS, States
+from canbase_action_server.state_topics import STATE_TOPICS, States, without_contested
 from canbase_config.robot import Robot
 from canbase_runtime.received import NEVER, Received
 
@@ -119,6 +119,7 @@ class GoalQueue:
         terms, invalid = request.terms, request.range_reason(self._robot)
         if invalid is not None:
             return None if terms.reports_invalid else invalid
+        inputs = without_contested(inputs, now_s)
         return self._no_place() or state_reason(self._robot, inputs, now_s, terms.release_s > 0.0)
 
     def admit(self, key: str, request: Request, now_s: float) -> None:
@@ -152,6 +153,7 @@ class GoalQueue:
 
     def tick(self, inputs: Inputs, now_s: float) -> Cycle:
         """One control cycle."""
+        inputs = without_contested(inputs, now_s)
         ends = self._drop(inputs, now_s)
         began = self._begin(inputs, now_s)
         waiting = self._waiting_feedback(now_s)

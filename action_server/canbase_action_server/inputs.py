@@ -6,6 +6,7 @@ The node fills these from its topics. `state_topics.py`: how old each may be, an
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from canbase_action_server.along_track import Pose
@@ -74,6 +75,8 @@ class Inputs:
     safety: Received[Safety] = NEVER
     driver: Received[Driver] = NEVER
     mux: Received[Mux] = NEVER
+    contested: Received[Mapping[str, str]] = NEVER
+    """The last report of velocity_mux that names second publishers: topic, and a sentence with both nodes."""
     cancel_requested: bool = False
     preempted: bool = False
     """A newer goal waits for the base."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from nav_msgs.msg import Odometry as OdometryMessage
 
 from canbase_action_server.along_track import Pose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
+from canbase_runtime.chain_topics import ChainTopic
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.stop_cause import stop_cause
@@ -46,3 +49,13 @@ def mux_in(message: MuxState, own_source: str) -> Mux:
     """From velocity_mux/state. `own_source`: name of the source that the goals' orders go to."""
     locked = (source.reason for source in message.sources if source.name == own_source and source.locked)
     return Mux(printable(message.active), printable(next(locked, "")))
+
+
+def contested_in(message: MuxState, states: Mapping[str, ChainTopic]) -> dict[str, str]:
+    """From velocity_mux/state: which of `states` (by full name) have a second publisher, and who that is.
+
+    A publisher of a different type is not received.
+    """
+    received = (found for found in message.foreign if found.topic in states and found.type == states[found.topic].type)
+    sentences = ((found.topic, f"{found.node} publishes on {found.topic}: {found.problem}") for found in received)
+    return {states[topic].topic: printable(sentence, SENTENCE_LENGTH) for topic, sentence in sentences}

@@ -43,6 +43,7 @@ from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_num
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
+from canbase_runtime.chain_topics import CHAIN, Use
 from canbase_runtime.journal import Journal, Voice
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.message_reader import MessageReader
@@ -78,6 +79,7 @@ class DriveDistanceServer(Node):
         self._goal_queue = GoalQueue(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._inputs = Inputs()
+        self._states = {self.resolve_topic_name(row.topic): row for row in CHAIN if row.use is Use.STATE}
         self._reader = MessageReader()
         self._odometry_waiting: tuple[bytes, float] | None = None
         """The last message of odom that was not looked at yet, serialized, and when it was received."""
@@ -174,8 +176,10 @@ class DriveDistanceServer(Node):
         self._inputs = replace(self._inputs, driver=Received(messages.driver_in(message), time.monotonic()))
 
     def _on_mux(self, message: MuxState) -> None:
-        mux = Received(messages.mux_in(message, self._own_source), time.monotonic())
-        self._inputs = replace(self._inputs, mux=mux)
+        now_s, contested = time.monotonic(), messages.contested_in(message, self._states)
+        self._inputs = replace(self._inputs, mux=Received(messages.mux_in(message, self._own_source), now_s))
+        if contested:  # a second publisher of this topic, which reports none, does not hide it
+            self._inputs = replace(self._inputs, contested=Received(contested, now_s))
 
     def _serve(self, binding: Binding) -> ActionServer:
         name = action_name(binding.name, self.resolve_topic_name, self.resolve_service_name)

@@ -8,20 +8,23 @@ from typing import Final
 from rclpy.node import Node
 
 from canbase_config.robot import Robot
+from canbase_runtime.chain_topics import CHAIN, Use
 from canbase_runtime.foreign_text import printable
 from canbase_velocity.unexpected_publishers import Expected, Publisher
 
-STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 SCAN_KIND: Final = "sensor_msgs/msg/LaserScan"
 BUTTON_KIND: Final = "std_msgs/msg/Bool"
-OWNERS: Final = {"cmd_vel_mux": "velocity_mux", "cmd_vel": "safety_filter"}
-SHOWN: Final = "cmd_vel_mux"
-"""Published for people to look at: the order itself stays in the process."""
+CONSEQUENCES: Final = {
+    Use.VELOCITY: "",
+    Use.SHOWN: "; it does not move the base",
+    Use.STATE: "; no goal runs meanwhile",
+}
+"""What else to report about a foreign publisher on a topic of the chain."""
 _NO_NAME: Final = "_NODE_NAME_UNKNOWN_"
 
 
 def expected(robot: Robot, node: Node) -> tuple[Expected, ...]:
-    """The expected publishers: on every source's topic, and on the two of the chain itself."""
+    """The expected publishers: on every source's topic, and on those of the chain itself."""
     return (*_of_sources(robot, node), *_of_chain(node))
 
 
@@ -55,7 +58,14 @@ def _of_sources(robot: Robot, node: Node) -> Iterator[Expected]:
 
 
 def _of_chain(node: Node) -> Iterator[Expected]:
-    for topic, owner in OWNERS.items():
-        nodes = (full_name(owner, node.get_namespace()),)
-        shown = topic == SHOWN
-        yield Expected(node.resolve_topic_name(topic), STAMPED, None, nodes, alone=True, shown=shown)
+    for row in CHAIN:
+        yield Expected(
+            node.resolve_topic_name(row.topic),
+            row.type,
+            None,
+            (full_name(row.node, node.get_namespace()),),
+            alone=True,
+            obeyed=row.use is Use.VELOCITY,
+            shown=row.use is Use.SHOWN,
+            consequence=CONSEQUENCES[row.use],
+        )

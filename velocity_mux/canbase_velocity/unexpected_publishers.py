@@ -1,11 +1,12 @@
-"""Nodes that publish velocities without being expected: on sources' topics, on cmd_vel_mux and on cmd_vel.
+"""Nodes that publish without being expected: on sources' topics, and on the topics of the chain (chain_topics.py).
 
 A ROS message does not contain its publisher, so they are found in the ROS graph. mux_node.py queries the graph.
 
 Rules:
 1. On a source's topic those are foreign that its `nodes` do not name; without `nodes` anybody may publish there.
-2. cmd_vel_mux and cmd_vel belong to one node each; every other publisher, and a second one of that name, is foreign.
-   Nothing obeys cmd_vel_mux: it shows what the mux orders. A foreign publisher there is a notice and disturbs nothing.
+2. A topic of the chain belongs to one node; every other publisher, and a second one of that name, is foreign. One that
+   was killed counts until DDS removes it, after about 20 s. Nothing obeys cmd_vel_mux: it shows what the mux orders. A
+   foreign publisher there is a notice and disturbs nothing. One on a state ends goals; sources are not disturbed.
 3. A publisher of another message type is not received at all. That is reported, and it disturbs nothing.
 4. A publisher whose node is not known (yet) counts after PATIENCE_S: discovery finds names a little later than topics.
 """
@@ -33,8 +34,12 @@ class Expected:
     """Full names of the nodes that may publish there; empty: anybody."""
     alone: bool = False
     """One publisher at most."""
+    obeyed: bool = True
+    """What arrives there moves the base."""
     shown: bool = False
     """Published for people to look at: nothing obeys it."""
+    consequence: str = ""
+    """Ends the sentence about a foreign publisher."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +61,7 @@ class Foreign:
     problem: str
     source: str | None
     obeyed: bool
-    """Its messages are obeyed: of the right type, on a topic that counts."""
+    """Its messages are obeyed: of the right type, on a topic of velocities that counts."""
     shown: bool = False
     """It is on a topic that nothing obeys."""
 
@@ -94,23 +99,22 @@ class ForeignWatch:
         patient = now_s - self._unknown_since.get(expected.topic, now_s) < PATIENCE_S
         counts = Counter(publisher.node for publisher in publishers if publisher.kind == expected.kind)
         found = []
-        for publisher in sorted(set(publishers), key=lambda p: (p.node, p.kind)):
-            problem = _problem(publisher, expected, counts[publisher.node])
-            if problem and (publisher.node or not patient):
-                node, obeyed = publisher.node or UNKNOWN, publisher.kind == expected.kind and not expected.shown
+        for node, kind in sorted({(publisher.node, publisher.kind) for publisher in publishers}):
+            problem = _problem(node, kind, expected, counts[node])
+            if problem and (node or not patient):
+                obeyed = kind == expected.kind and expected.obeyed
                 found.append(
-                    Foreign(expected.topic, node, publisher.kind, problem, expected.source, obeyed, expected.shown)
+                    Foreign(expected.topic, node or UNKNOWN, kind, problem, expected.source, obeyed, expected.shown)
                 )
         return found
 
 
-def _problem(publisher: Publisher, expected: Expected, count: int) -> str:
+def _problem(node: str, kind: str, expected: Expected, count: int) -> str:
     """Empty: there is none."""
-    if publisher.kind != expected.kind:
-        return f"of type {publisher.kind}, which is not received; expected {expected.kind}"
+    if kind != expected.kind:
+        return f"of type {kind}, which is not received; expected {expected.kind}"
     if not expected.nodes:
         return ""
-    if publisher.node not in expected.nodes:
-        nobody = "; it does not move the base" if expected.shown else ""
-        return f"only {' and '.join(expected.nodes)} should{nobody}"
-    return f"{count} times; is it running twice?" if expected.alone and count > 1 else ""
+    if node not in expected.nodes:
+        return f"only {' and '.join(expected.nodes)} should{expected.consequence}"
+    return f"{count} times; is it running twice?{expected.consequence}" if expected.alone and count > 1 else ""

@@ -52,7 +52,7 @@ class Velocity:
         self.node, self.process = node, process
         self.orders: Recorder[TwistStamped] = node.record(TwistStamped, "cmd_vel")
         self.states: Recorder[MuxState] = node.record(MuxState, "velocity_mux/state", LATCHED)
-        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0)
+        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0, owner="motor_driver")
         self.driver.message = DriverStatus(state=DriverStatus.ENABLED)
         self.diagnostics: Recorder[DiagnosticArray] = node.record(DiagnosticArray, "/diagnostics")
         node.wait_for(lambda: self.orders.last is not None and self.states.last is not None, START_S, "cmd_vel")

@@ -60,7 +60,7 @@ def test_a_stream_of_a_controller_is_followed_on_cmd_vel(
     orders = test_node.record(TwistStamped, "cmd_vel")
     mux = test_node.record(MuxState, "velocity_mux/state")
     test_node.wait_for(lambda: publisher.get_subscription_count() == 1 and orders.messages, START_S, "mux and filter")
-    driver = test_node.repeat(DriverStatus, "motor_driver/status", 20.0)
+    driver = test_node.repeat(DriverStatus, "motor_driver/status", 20.0, owner="motor_driver")
     driver.message = DriverStatus(state=DriverStatus.ENABLED)
     test_node.wait_for(lambda: mux.last is not None and mux.last.sources[0].armed, START_S, "2 s of silence")
     asked: list[tuple[float, float]] = []

@@ -37,7 +37,7 @@ class Site:
         self.spawn, self.node, self.config, self.folder = spawn, node, config, folder
         self.orders, self.mux = node.record(TwistStamped, "cmd_vel"), node.record(MuxState, "velocity_mux/state")
         spawn(RUN.format(path=str(config), ros_args=[]))
-        driver = node.repeat(DriverStatus, "motor_driver/status", 20.0)
+        driver = node.repeat(DriverStatus, "motor_driver/status", 20.0, owner="motor_driver")
         driver.message = DriverStatus(state=DriverStatus.ENABLED)
         node.wait_for(lambda: self.orders.messages, START_S, "mux and filter")
 

@@ -169,6 +169,7 @@ class TestNode:
         no_signals = SignalHandlerOptions.NO
         rclpy.init(args=[], context=self.context, domain_id=domain_id, signal_handler_options=no_signals)
         self.node = Node(name, namespace=namespace, context=self.context, enable_rosout=False)
+        self._played: dict[str, Node] = {}
         self._sources: dict[str, Repeater[Any]] = {}
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
@@ -180,9 +181,19 @@ class TestNode:
         self.node.create_subscription(kind, topic, with_times, qos)
         return recorder
 
-    def repeat(self, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int = 1) -> Repeater[T]:
-        """A publisher that publishes nothing until its `message` is set."""
-        return Repeater(self.node, kind, topic, rate_hz, qos)
+    def repeat(
+        self, kind: type[T], topic: str, rate_hz: float, qos: QoSProfile | int = 1, owner: str = ""
+    ) -> Repeater[T]:
+        """A publisher that publishes nothing until its `message` is set. `owner`: the node that it stands for."""
+        return Repeater(self.played(owner) if owner else self.node, kind, topic, rate_hz, qos)
+
+    def played(self, name: str) -> Node:
+        """A node of that name beside this one: what it publishes comes from the node that should."""
+        if name not in self._played:
+            space = self.node.get_namespace()
+            self._played[name] = Node(name, namespace=space, context=self.context, enable_rosout=False)
+            self.executor.add_node(self._played[name])
+        return self._played[name]
 
     def source(self, topic: str = "cmd_vel_joy", kind: type[Any] = TwistStamped, qos: QoSProfile | int = 1) -> Any:
         """A source of the mux at 50 Hz that may drive: it was found, and has commanded zero for a moment.
@@ -234,7 +245,8 @@ class TestNode:
     def close(self) -> None:
         """Leaves the ROS graph."""
         self.executor.shutdown()
-        self.node.destroy_node()
+        for node in (self.node, *self._played.values()):
+            node.destroy_node()
         self.context.try_shutdown()
 
     def __enter__(self) -> TestNode:

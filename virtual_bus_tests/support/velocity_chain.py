@@ -62,7 +62,7 @@ class Chain:
         self.action = node.repeat(TwistStamped, "cmd_vel_action", 50.0)
         self.scan = scanner(node)
         self.estop = node.repeat(Bool, "estop_state", 20.0)
-        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0)
+        self.driver = node.repeat(DriverStatus, "motor_driver/status", 20.0, owner="motor_driver")
         for repeater in (self.joystick, self.action, self.scan, self.estop, self.driver):
             node.wait_for_subscriber(repeater.publisher, START_S)
         node.wait_for(lambda: self.mux.last is not None and self.state.last is not None, START_S, "the first states")

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import product
 
 import pytest
+from canbase.msg import ForeignPublisher, MuxState
 
 from canbase_action_server.goal_queue import GoalQueue
 from canbase_action_server.goal_request import DriveRequest, Request, RotateRequest
 from canbase_action_server.inputs import Inputs, Mux
+from canbase_action_server.messages import contested_in
 from canbase_action_server.motion import STOP
 from canbase_action_server.nav2_request import Target, back_up, drive_on_heading, spin
 from canbase_action_server.outcome import ErrorCode
-from canbase_action_server.state_topics import DRIVER, MUX, ODOMETRY, SAFETY, STATE_TOPICS, States
+from canbase_action_server.state_topics import DRIVER, MUX, ODOMETRY, SAFETY, STATE_TOPICS, States, without_contested
 from canbase_config.state_age import JITTER_S, STATE_PERIOD_S, state_timeout_s
+from canbase_runtime.chain_topics import CHAIN, Use
+from canbase_runtime.received import NEVER, Received
 from support.action_plant import Plant, Story, bench_robot, drive, good_inputs, replaced
 from support.goal_queue_world import GoalQueueWorld, robot_with
 
@@ -33,6 +37,7 @@ def test_every_state_is_a_topic() -> None:
     assert [topic.topic for topic in STATE_TOPICS] == [
         "odom", "motor_driver/status", "safety_filter/state", "velocity_mux/state",
     ]  # fmt: skip
+    assert [topic.row for topic in STATE_TOPICS] == [row for row in CHAIN if row.use is Use.STATE]
 
 
 def test_a_state_may_miss_one_message_and_be_late_and_not_miss_two_in_time() -> None:
@@ -57,7 +62,7 @@ def test_a_state_counts_until_its_timeout_and_not_longer(name: str, over_s: floa
     assert (silence is not None) is (over_s > 0.0)
     if silence is not None:
         assert f"no message on {FIELDS[name].topic} for {age_s:.2f} s (timeout" in silence
-        assert f"is {FIELDS[name].node} running?" in silence
+        assert f"is {FIELDS[name].row.node} running?" in silence
 
 
 def test_what_was_never_received_is_named_so() -> None:
@@ -167,3 +172,63 @@ def test_every_action_depends_on_the_same_states(request_: Request, name: str) -
     assert end.code is FIELDS[name].code
     assert all(twist == STOP for at_s, twist in story.orders if at_s > 2.33)
     assert end.stands
+
+
+BAG = "/rosbag2_player publishes on /{}: only /{} should; no goal runs meanwhile"
+
+
+def contest(world: GoalQueueWorld, name: str, reported_s: float) -> None:
+    """velocity_mux reports a second publisher of this state at that time."""
+    row = FIELDS[name].row
+    report: Received[Mapping[str, str]] = Received({row.topic: BAG.format(row.topic, row.node)}, reported_s)
+    world.change = lambda inputs: replace(inputs, contested=report)
+
+
+@pytest.mark.parametrize(("name", "phase"), list(product(FIELDS, PHASES)))
+def test_a_second_publisher_of_a_state_ends_the_goal_at_once_and_none_starts(name: str, phase: str) -> None:
+    world = GoalQueueWorld(robot_with("queue"))
+    key, second = world.ask_way(1.0), world.ask_way(-1.0)
+    world.run(PHASES[phase])
+    assert world.goals[key].ends == []
+    contest(world, name, math.inf)  # again and again, as long as it is there
+    world.run(10.0, lambda: not world.goal_queue.busy)
+    (end,) = world.goals[key].ends
+    assert end.code in (FIELDS[name].code, ErrorCode.OK)
+    assert (end.code is ErrorCode.OK) <= (phase == "at the goal")
+    if end.code is not ErrorCode.OK:
+        assert BAG.format(FIELDS[name].topic, FIELDS[name].row.node) in end.message
+    assert world.code(second) is FIELDS[name].code
+    stood_m = world.x_m
+    reason = world.goal_queue.refusal(DriveRequest(1.0, 0.3), world.inputs, world.now_s)
+    assert reason is not None
+    assert BAG.format(FIELDS[name].topic, FIELDS[name].row.node) in reason
+    world.run(3.0)
+    assert world.x_m == stood_m
+
+
+def test_a_state_of_two_publishers_does_not_confirm_standstill() -> None:
+    inputs = good_inputs(Plant().odometry(10.0))
+    both: Mapping[str, str] = {ODOMETRY.topic: "x", DRIVER.topic: "y"}
+    known = without_contested(replace(inputs, contested=Received(both, 10.0)), 10.0)
+    assert (known.odometry, known.driver) == (NEVER, NEVER)
+    assert (known.safety, known.mux) == (inputs.safety, inputs.mux)
+
+
+@pytest.mark.parametrize(("age_s", "counts"), [(0.0, True), (0.3 - 1e-9, True), (0.3 + 1e-9, False)])
+def test_a_report_of_a_second_publisher_counts_as_long_as_a_state_of_the_mux(age_s: float, counts: bool) -> None:
+    inputs = replace(good_inputs(Plant().odometry(10.0)), contested=Received({MUX.topic: "x"}, 10.0 - age_s))
+    assert (without_contested(inputs, 10.0).mux is NEVER) is counts
+
+
+def test_publishers_of_other_topics_and_of_other_types_contest_nothing() -> None:
+    kinds = {row.topic: row.type for row in CHAIN}
+    rows = [
+        ForeignPublisher(topic="/r1/odom", node="/bag", type=kinds["odom"], problem="only /r1/motor_driver should"),
+        ForeignPublisher(topic="/odom", node="/bag", type=kinds["odom"], problem="only /motor_driver should"),
+        ForeignPublisher(topic="/r1/motor_driver/status", node="/bag", type="std_msgs/msg/Bool", problem="of type"),
+        ForeignPublisher(topic="/r1/cmd_vel", node="/bag", type=kinds["cmd_vel"], problem="only"),
+    ]
+    states = {f"/r1/{row.topic}": row for row in CHAIN if row.use is Use.STATE}
+    assert contested_in(MuxState(foreign=rows), states) == {
+        "odom": "/bag publishes on /r1/odom: only /r1/motor_driver should"
+    }
