@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from canbase_action_server.feedback_watch import MAX_TIMEOUT_S
 from canbase_action_server.outcome import Status
-from canbase_cli.options import RosCommand
+from canbase_cli.options import ROS_FLAG, RosCommand
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.terminal import FAILED, colour, fail
 
@@ -61,6 +62,8 @@ WITHOUT_SERVER: Final = (
     "(mux.sources, 0.3 s by default). If only this computer is cut off, the goal goes on: `canbase stop`"
 )
 
+_SIGNED_WITH_UNIT: Final = re.compile(r"-[0-9.]+[a-zA-Z°]+")
+
 Show = Callable[[float, float], None]
 """Called with what is done (signed) and what is left, in the goal's unit."""
 
@@ -69,6 +72,13 @@ class GoalCommand(RosCommand):
     """A command whose argument may be negative: `canbase drive -0.5` is no option."""
 
     ignore_unknown_options = True
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """A negative number with a unit (-90deg) goes behind `--`: its letters would be read as short options."""
+        at = args.index(ROS_FLAG) if ROS_FLAG in args else len(args)
+        signed = [word for word in args[:at] if _SIGNED_WITH_UNIT.fullmatch(word)]
+        behind = ["--", *signed] if signed else []
+        return super().parse_args(ctx, [*(word for word in args[:at] if word not in signed), *behind, *args[at:]])
 
 
 class Interrupts:

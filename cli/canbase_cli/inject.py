@@ -38,7 +38,7 @@ def inject(
         str,
         typer.Argument(
             metavar="FAULT",
-            help="Of a process: hang, continue, kill. Of a drive: cut, encoder_lost, … A wrong name prints all.",
+            help="Of a process: hang, continue, kill. Of a drive: one of those below.",
         ),
     ],
     values: Annotated[
@@ -49,6 +49,11 @@ def inject(
     """Cause one failure on a simulated robot while `canbase up` runs. Refused on a real bus.
 
     `continue` ends a hang. After `kill` start `canbase up` again. `canbase inject all heal` ends the faults of drives.
+
+    Faults of a drive: aliases, blocked, bus_off, cut, deaf, encoder_frozen, encoder_intermittent, encoder_jumping,
+    encoder_lost, encoder_reversed, encoder_scaled, encoder_zero, extra_boot_up, fault, frozen_encoder, guard_stuck,
+    heal, ignores_setpoints, limited, mute_boot, no_mains, no_requests, power_cycle, reset_node, rpdo_lost, short_emcy,
+    silent, sto, stuck_velocity, tpdo_lost, unbraked, weak.
 
     Exit codes: 0 done, 1 the target does not run or the simulator refuses, 2 wrong command line or robot.yaml.
     """
@@ -82,12 +87,12 @@ def _break(robot: Robot, target: str, fault: str, arguments: Mapping[str, Any]) 
     from canbase_sim.control import ControlError, SimControl, control_path
     from canbase_sim.faults import KINDS
 
-    if fault not in KINDS:
-        fail(f"there is no fault {fault!r} of a drive, expected one of {', '.join(KINDS)}", WRONG_INPUT)
     wheels = [drive for drive in robot.drives if target in (ALL, drive.joint)]
     if not wheels:
         known = ", ".join((*PARTS, ALL, *(drive.joint for drive in robot.drives)))
-        fail(f"{target!r} is no part and no joint of {robot.name}, expected one of {known}", WRONG_INPUT)
+        fail(f"{target!r} is no process and no joint of {robot.name}, expected one of {known}", WRONG_INPUT)
+    if fault not in KINDS:
+        fail(f"there is no fault {fault!r} of a drive, expected one of {', '.join(KINDS)}", WRONG_INPUT)
     by_axis = "axis" in KINDS[fault][1]
     places = sorted({(drive.node_id, drive.axis if by_axis else 0) for drive in wheels})
     try:

@@ -22,7 +22,7 @@ from canbase_runtime.wrong_start import WrongStartError
 
 ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 WRONG_COMMAND_LINE: Final = 2
-_ROS_FLAG: Final = "--ros-args"
+ROS_FLAG: Final = "--ros-args"
 _GENERATOR: Final = "rosidl_generator_py.generate_py_impl"
 """The messages' package imports the generator of their Python code, a parser with it, wherever that can be imported.
 Only a build needs it: 2.6 MB of each process, and 0.02 s of its start."""
@@ -73,8 +73,8 @@ class RosCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Reads what stands before `--ros-args`."""
-        at = args.index(_ROS_FLAG) if _ROS_FLAG in args else len(args)
-        ctx.meta[_ROS_FLAG] = args[at + 1 :]
+        at = args.index(ROS_FLAG) if ROS_FLAG in args else len(args)
+        ctx.meta[ROS_FLAG] = args[at + 1 :]
         return super().parse_args(ctx, args[:at])
 
     def invoke(self, ctx: Any) -> Any:
@@ -88,7 +88,7 @@ class RosCommand(TyperCommand):
             exceptions = sys.modules.get("rclpy.exceptions")
             if exceptions is None or not isinstance(error, exceptions.InvalidParameterTypeException):
                 raise
-            raise typer.BadParameter(f"behind {_ROS_FLAG}: {error}") from error
+            raise typer.BadParameter(f"behind {ROS_FLAG}: {error}") from error
 
 
 def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
@@ -96,11 +96,11 @@ def ros_arguments(ctx: typer.Context, namespace: str) -> list[str]:
 
     Raises typer.BadParameter for what ROS does not take: call it before anything is opened.
     """
-    given = list(ctx.meta.get(_ROS_FLAG, ()))
+    given = list(ctx.meta.get(ROS_FLAG, ()))
     if given:
         _check_ros_arguments(given)
     remap = ["-r", f"__ns:={namespace}"] if namespace else []
-    return [_ROS_FLAG, *remap, *given] if remap or given else []
+    return [ROS_FLAG, *remap, *given] if remap or given else []
 
 
 def check_unused_ros_arguments(ctx: typer.Context) -> None:
@@ -109,7 +109,7 @@ def check_unused_ros_arguments(ctx: typer.Context) -> None:
     Raises typer.BadParameter for what ROS does not take. Without ROS 2, or with one that cannot be loaded, nothing can
     check them: a defect of ROS keeps no watchdog from starting.
     """
-    given = list(ctx.meta.get(_ROS_FLAG, ()))
+    given = list(ctx.meta.get(ROS_FLAG, ()))
     if given and _has_ros():
         _check_ros_arguments(given)
 
@@ -131,12 +131,12 @@ def _check_ros_arguments(given: list[str]) -> None:
         from rclpy.impl.implementation_singleton import rclpy_implementation
     context = Context()
     try:
-        context.init([_ROS_FLAG, *given])
+        context.init([ROS_FLAG, *given])
     except rclpy_implementation.UnknownROSArgsError as error:
         words = str(error).strip("[]").replace("'", "")
-        raise typer.BadParameter(f"ROS does not know {words} behind {_ROS_FLAG}") from error
+        raise typer.BadParameter(f"ROS does not know {words} behind {ROS_FLAG}") from error
     except rclpy_implementation.RCLError as error:
-        raise typer.BadParameter(f"behind {_ROS_FLAG}: {str(error).partition(', at /')[0]}") from error
+        raise typer.BadParameter(f"behind {ROS_FLAG}: {str(error).partition(', at /')[0]}") from error
     context.try_shutdown()
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+import re
+from typing import Annotated, Final
 
 import typer
 
@@ -18,12 +19,35 @@ from canbase_cli.goal import (
 )
 from canbase_cli.options import NamespaceOption, right_start, ros_arguments, ros_needed
 
+_ANGLE: Final = re.compile(r"([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)\s*(rad|deg|°|)", re.IGNORECASE)
+
+
+def angle_rad(text: str, degrees: bool) -> float:
+    """`1.57`, `1.57rad`, `90deg` or `90°` in radians. `degrees`: a bare number is in degrees.
+
+    Raises typer.BadParameter for other words, and for a bare number of radians beyond a full turn: `90` is a slip.
+    """
+    match = _ANGLE.fullmatch(text.strip())
+    try:
+        value = float(match[1]) if match else math.nan
+    except ValueError:  # 1.2.3
+        value = math.nan
+    if match is None or not math.isfinite(value):
+        raise typer.BadParameter(f"ANGLE is {text!r}, expected a number such as 1.57, 1.57rad or 90deg")
+    unit = match[2].lower() or ("deg" if degrees else "")
+    if not unit and abs(value) > math.tau:
+        turns = abs(value) / math.tau
+        raise typer.BadParameter(f"ANGLE {text} is {turns:.1f} turns in radians; write {text}deg or {text}rad")
+    return value if unit in ("", "rad") else math.radians(value)
+
 
 def rotate(
     ctx: typer.Context,
-    angle: Annotated[float, typer.Argument(metavar="ANGLE", help="in rad, negative: clockwise; may be many turns")],
+    angle: Annotated[
+        str, typer.Argument(metavar="ANGLE", help="1.57 or 1.57rad, 90deg; negative: clockwise; may be many turns")
+    ],
     speed_radps: Annotated[float, typer.Option("--speed", "-s", metavar="SPEED", help="highest speed, rad/s")] = 0.5,
-    degrees: Annotated[bool, typer.Option("--degrees", "-d", help="ANGLE is in degrees.")] = False,
+    degrees: Annotated[bool, typer.Option("--degrees", "-d", help="A number without a unit is in degrees.")] = False,
     cancel_after_s: CancelAfterOption = None,
     wait_s: WaitOption = 5.0,
     feedback_timeout_s: FeedbackTimeoutOption = FEEDBACK_TIMEOUT_S,
@@ -37,6 +61,7 @@ def rotate(
     Exit codes: 0 succeeded, 1 other failures, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
     not found, has ended, or does not answer, 7 canceled because no feedback arrived.
     """
+    wanted_rad = angle_rad(angle, degrees)
     with ros_needed():
         import rclpy
         from rclpy.signals import SignalHandlerOptions
@@ -44,7 +69,6 @@ def rotate(
         from canbase_action_server.rotate_client import RotateClient
 
     rclpy.init(args=ros_arguments(ctx, namespace), signal_handler_options=SignalHandlerOptions.NO)
-    angle_rad = math.radians(angle) if degrees else angle
     interrupts = Interrupts()
     try:
         with interrupts.caught(), right_start():
@@ -52,13 +76,13 @@ def rotate(
             client = RotateClient(node, feedback_timeout_s=feedback_timeout_s)
             run_goal(
                 lambda show, interrupted: client.send(
-                    angle_rad,
+                    wanted_rad,
                     speed_radps,
                     on_feedback=lambda feedback: show(feedback.turned_rad, feedback.remaining_rad),
                     discovery_timeout_s=wait_s,
                     interrupted=interrupted,
                 ),
-                angle_rad,
+                wanted_rad,
                 "rad",
                 cancel_after_s,
                 as_json,

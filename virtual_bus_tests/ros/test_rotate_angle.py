@@ -83,7 +83,7 @@ def test_drive_and_turn_share_one_base_and_wrong_numbers_are_rejected(stage: Sta
 
 def test_canbase_rotate_turns_and_tells(stage: Stage) -> None:
     command = [sys.executable, "-c", "from canbase_cli.main import app; app()", "rotate"]
-    process = stage.spawn([*command, "-90", "--degrees", "--speed", "1.0", "--json"])
+    process = stage.spawn([*command, "-90deg", "--speed", "1.0", "--json"])
     stage.node.wait_for(lambda: process.exit_code is not None, 20.0, "the end of canbase rotate")
     assert process.exit_code == 0, process.log()
     told = json.loads(process.log())

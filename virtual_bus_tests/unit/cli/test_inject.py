@@ -11,9 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from canbase_cli.inject import inject
 from canbase_cli.main import app
 from canbase_config.load import load_robot, sample, samples
 from canbase_sim.control import control_path
+from canbase_sim.faults import KINDS
 
 
 def canbase(*words: str) -> tuple[int, str]:
@@ -68,7 +70,8 @@ def test_all_goes_to_each_drive(robot: Path, simulator: list[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [
-        (["left_whel", "cut"], 2, "'left_whel' is no part and no joint of"),
+        (["left_whel", "cut"], 2, "'left_whel' is no process and no joint of"),
+        (["drivre", "hang"], 2, "'drivre' is no process and no joint of"),
         (["left_wheel", "broken"], 2, "there is no fault 'broken' of a drive, expected one of silent, deaf, cut"),
         (["left_wheel", "weak", "0.3"], 2, "'0.3': expected NAME=VALUE"),
         (["left_wheel", "weak", "share=much"], 2, "share = 'much': expected a number"),
@@ -80,6 +83,12 @@ def test_all_goes_to_each_drive(robot: Path, simulator: list[str]) -> None:
 def test_what_it_refuses(robot: Path, words: list[str], code: int, says: str) -> None:
     found, text = canbase("inject", *words, "-c", str(robot))
     assert (found, says in " ".join(text.split())) == (code, True), text
+
+
+def test_help_lists_each_fault_of_a_drive() -> None:
+    listed = re.search(r"Faults of a drive: (.*?)\.", " ".join((inject.__doc__ or "").split()))
+    assert listed is not None
+    assert listed[1].split(", ") == sorted(KINDS)
 
 
 def test_nothing_is_broken_on_a_real_bus(tmp_path: Path) -> None:
