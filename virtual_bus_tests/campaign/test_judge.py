@@ -82,6 +82,23 @@ def goes_on(world: World, pulse_s: float = 9.0) -> None:
     driver._changed = mad  # type: ignore[method-assign]
 
 
+def creeps(world: World) -> None:
+    """Where zero is ordered the driver sends setpoints of 4 cm/s."""
+    changed = world.driver._changed
+
+    def creeping(frames: list[Frame]) -> list[Frame]:
+        sent = []
+        for frame in changed(frames):
+            for drive in world.robot.drives:
+                if frame.cob_id == 0x200 + 0x100 * drive.axis + drive.node_id and frame.data[2:] == bytes(4):
+                    bits = round(0.04 / mps_per_bit(drive, world.robot.base.wheel_radius_m))
+                    frame = Frame(frame.cob_id, SETPOINT.pack(0x0F, bits))
+            sent.append(frame)
+        return sent
+
+    world.driver._changed = creeping  # type: ignore[method-assign]
+
+
 def gentle_ramps(world: World) -> None:
     """The driver has set ramps that hardly brake."""
     for node in world.drives.bench.nodes.values():
@@ -259,6 +276,9 @@ STORIES = (
     Story("an emergency stop that brakes as an ordinary one",
           plan(PRESSED, segments=(stick(0.8, 0.0, 0.0, 9.0),)), "short", brakes_softly),
     Story("the same in a curve", plan(PRESSED, segments=(stick(0.8, 0.5, 0.0, 9.0),)), "short", brakes_softly),
+    Story("a driver that creeps after each order of zero", plan(segments=SHORT), "rest", creeps, "watchdog:all"),
+    Story("a stick that is held while no scans come", plan(fault("scan_stale", 0.8, 2.2, share=1.0), segments=LONG),
+          "pauses", None, UNMINDED),
     Story("a loaded base that swings back after its drives' own stop, and drives without masters",
           plan(replace(CUT, start_s=2.0), segments=(stick(1.1, 0.0, 0.0, 9.0),)), "heartbeat", no_masters,
           "drives:heartbeat_consumer", LOADED),

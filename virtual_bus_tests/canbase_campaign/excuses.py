@@ -18,7 +18,7 @@ STEP_S = 0.01
 """The judge looks so often."""
 MOST_SHARE, MOST_STOP_SHARE = 0.05, 0.01
 """Of the time in motion a property is excused for less than this; one that is about the stop for less than that."""
-STOPS = ("envelope", "sources", "held", "estop", "latched", "short")
+STOPS = ("envelope", "sources", "held", "estop", "latched", "short", "rest", "pauses")
 """Properties that are about the stop."""
 
 
@@ -99,6 +99,11 @@ EXCUSES = {
         "without a driver there is no SYNC and no drive reports: the driver is missed first; so is the watchdog when a "
         "stranger's setpoints move the base",
         3.0,
+    ),
+    "pushed": Excuse(
+        "a force beyond that of the floor acts on the body: a drive yields until its loop holds against it, and "
+        "without power friction alone holds",
+        math.inf,
     ),
     "no motor follows": Excuse(
         "no drive follows setpoints: all brake by ramps of their own, and a turn ends when the base stands", 10.0

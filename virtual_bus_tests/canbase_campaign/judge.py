@@ -26,8 +26,10 @@ from canbase_campaign.judged_by import CYCLES, MESSAGE_S, jerk_adds_s, lag_s, ma
 from canbase_campaign.motion_judge import MotionJudge
 from canbase_campaign.odometry_judge import OdometryJudge
 from canbase_campaign.outside import Outside, Surroundings
+from canbase_campaign.pause_judge import PauseJudge
 from canbase_campaign.planned import Plan
 from canbase_campaign.reach import BRAKES_S, Reach
+from canbase_campaign.rest_judge import RestJudge
 from canbase_campaign.robots import DrawnRobot
 from canbase_campaign.short_judge import ShortJudge
 from canbase_campaign.shown import Shown
@@ -112,6 +114,9 @@ class Judge:
         self._goals = GoalJudge(world, self._shown, self.ledger)
         self._motion = MotionJudge(world, self._shown, self.ledger)
         self._short = ShortJudge(world, self._shown, self.ledger)
+        self._rest = RestJudge(world, self._shown, self.ledger)
+        holds_s = self._one_s + world.robot.safety.command_timeout_s
+        self._pauses = PauseJudge(world, self._allowance("pauses", holds_s))
         self.trips: list[str] = []
         self.lives, self._fresh = 1, False
         """How often the base drove, with a reset between; whether one was done, and it has not moved since."""
@@ -120,6 +125,7 @@ class Judge:
         world.action.on_order = self._on_goal_order
         world.topics.watch = self._on_message
         world.topics.arrivals |= {source.topic: self._on_arrival for source in world.robot.mux.sources.values()}
+        world.topics.arrivals[world.robot.safety.scan.topic] = self._on_scan
         self._step()
 
     @property
@@ -167,6 +173,10 @@ class Judge:
         tau_s = braking_s(self._world.robot, twist.linear_mps, twist.angular_radps)
         self._envelope.order(tau_s, self._world.clock.now_s)
         self._motion.order(twist)
+        self._rest.order(twist.is_zero, self._world.clock.now_s)
+
+    def _on_scan(self, topic: str, scan: object) -> None:
+        self._pauses.on_scan(self._world.clock.now_s)
 
     def _locked_s(self, now_s: float) -> float:
         """So long a lock holds that the mux can know of."""
@@ -182,11 +192,13 @@ class Judge:
         if not isinstance(message, Twist):
             return
         self._wishes.take(topic, message, now_s)
+        self._pauses.take(topic, message, now_s)
         if topic == "cmd_vel_mux" and message.is_zero and not self._around.pressed:
             self._awaits_zero = False
 
     def _on_arrival(self, topic: str, message: Twist) -> None:
         self._wishes.arrive(topic, message, self._world.clock.now_s)
+        self._pauses.arrive(topic, message, self._world.clock.now_s)
         self._goals.arrived(topic, message)
 
     def _on_goal_order(self, twist: Twist) -> None:
@@ -208,6 +220,7 @@ class Judge:
         self._check_drives(now_s)
         self._check_stop_button(tau_s, now_s)
         self._check_short(now_s)
+        self._check_rest(tau_s, now_s)
         if not self._world.velocity.running:
             self._lock_from = now_s + FOUND_S
         self._check_wall(tau_s, now_s)
@@ -449,6 +462,23 @@ class Judge:
         over_s = now_s - self._pressed_at - self._around.button_s - self._one_s - longest_s
         if tau_s > 0.0 and is_late("estop", self.ledger, over_s, gives.items()):
             self._violate("estop", f"{self._shown}, {now_s - self._pressed_at:.2f} s after it was pressed")
+
+    def _check_rest(self, tau_s: float, now_s: float) -> None:
+        """At zero order, and after a pause."""
+        problem = self._pauses.step(tau_s, now_s, locked=self._locked_s(now_s) > HEARD_S, active=self._active)
+        if problem:
+            self._violate("pauses", f"{self._shown}: {problem}")
+        world = self._world
+        moved = now_s <= self._strangers.acted_at + self.react_s
+        gives = dict(self._active.gives_s())
+        gives["unreachable"] = math.inf if self._reach.was_lost else 0.0
+        gives["rolls out"] = math.inf if self._active.coasting else 0.0
+        gives["strange hands"] = math.inf if moved else 0.0
+        gives["pushed"] = math.inf if world.drives.bench.base.push_n != world.drawn.push_n else 0.0
+        gives["lying sensor"] = math.inf if self._motion.ran_away or not self._shown.tells_truth else 0.0
+        problem = self._rest.step(now_s, tau_s == 0.0, gives)
+        if problem:
+            self._violate("rest", problem)
 
     def _check_short(self, now_s: float) -> None:
         """From the moment on in which a filter that runs has received the button."""

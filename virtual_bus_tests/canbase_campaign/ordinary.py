@@ -1,10 +1,12 @@
 """Ordinary driving of a random robot in virtual time: nothing is wrong, so nothing may trip, latch or lose its power.
 
 Slopes, thresholds, carpet, payload, slow ramps, noise, a computer that is late now and then, and people who stop it.
+What is ordinary follows from the body and the floor, never from what the robot tolerates.
 """
 
 from __future__ import annotations
 
+import math
 import struct
 from collections import deque
 from collections.abc import Callable
@@ -17,12 +19,9 @@ from canbase_campaign.hands import HANDS, Source
 from canbase_campaign.outside import Surroundings
 from canbase_campaign.robots import CREEP_SHARE, GRAVITY_MPS2, DrawnRobot, draw_robot
 from canbase_campaign.world import World
-from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.axis import Axis
 from canbase_sim.cia402.states import State
-from canbase_velocity.estop import EstopState
 from canbase_velocity.twist import ZERO
-from canbase_watchdog.watchdog import State as WatchdogState
 
 PACE: Final = Pace(drives_poll_s=0.01, command_parts=2.0)
 LOOK_S: Final = 0.02
@@ -34,19 +33,19 @@ HOLD_S: Final = (0.02, 0.2)
 """An obstacle holds a wheel for this long, like a threshold [s]."""
 HOLD_SHARE: Final = (0.2, 3.0)
 """It holds with this many times what the motor can push,"""
-HARDEST_SHARE: Final = 0.85
-"""... but brakes no wheel harder than this share of watchdog.jolt_mps2: something harder does stop the robot."""
+HIGHEST_M: Final = 0.008
+"""... but no harder than an edge of this height holds the wheel that has to climb it: higher ones stop small wheels."""
 CARPET: Final = (1.0, 1.0, 2.0, 4.0)
 """Dry friction, in multiples of the bare floor's."""
-STIFF_SHARE: Final = 0.8
-"""A drive that has to turn its torque round against the friction does so within this share of motion_missing_m: one
-that is softer needs a longer way there."""
+TURNS_ROUND_M: Final = 0.004
+"""A drive that has to turn its torque round against the friction does so within this way: one that is softer is not
+tuned for its floor."""
 RAMP_SHARES: Final = (1.0, 1.0, 0.5, 0.3)
-"""The drives' own ramps, as a share of the limits' acceleration; the watchdog counts on a quarter."""
+"""The drives' own ramps, as a share of the limits' acceleration: as set, by half, and by a third."""
 NOISE_MPS: Final = (0.0, 0.0, 0.002, 0.005)
 """606Ch beside the true speed, of drives that measure badly; below base.standstill_mps, or the base never stands."""
 LATE_S: Final = {"driver": 0.02, "watchdog": 0.06, "velocity": 0.05, "action": 0.1}
-"""A process may get no processor for this long now and then [s]: shorter than the shortest of its timeouts allows."""
+"""A process may get no processor for this long now and then [s]: the less priority, the longer."""
 LET_GO: Final = (State.SWITCHED_ON, State.SWITCH_ON_DISABLED)
 """At a stand the driver takes the power off for a moment, which may be over at the next look: docs/decisions/0041."""
 ROLLS_MPS: Final = 0.1
@@ -126,10 +125,10 @@ class OrdinaryHour:
 
     def _wrong(self) -> str:
         """What is not as it should be; empty: nothing."""
-        watchdog, driver = self.world.watchdog.core.status, self.world.driver.core
-        if watchdog.state is WatchdogState.TRIPPED:
-            return f"watchdog: {watchdog.verdict.cause.name.lower()}: {watchdog.verdict.detail}"
-        if driver.state is not DriverState.ENABLED:
+        watchdog, driver = self.world.watchdog, self.world.driver.core
+        if watchdog.tripped:
+            return f"watchdog: {watchdog.trip_cause}: {watchdog.core.status.verdict.detail}"
+        if not self.world.driver.enabled:
             return f"driver: {driver.state.name.lower()}: {driver.finding.cause.value}: {driver.finding.detail}"
         for change in self.world.drives.changes():
             lets_go = change.after in LET_GO and self._stands
@@ -193,7 +192,7 @@ class OrdinaryHour:
         room_n = min(body.peak_force_n - self._needs_n(), CREEP_SHARE * body.peak_force_n - body.coulomb_n)
         tuned_for_kg = body.mass_kg / len(self.drawn.robot.drives) + body.wheel_mass_kg
         stiffness_npm = tuned_for_kg * (body.bandwidth_radps / 2.0) ** 2
-        most_n = STIFF_SHARE * self.drawn.robot.watchdog.motion_missing_m * stiffness_npm / 2.0 - body.coulomb_n
+        most_n = TURNS_ROUND_M * stiffness_npm / 2.0 - body.coulomb_n
         self._carpet_n = max(0.0, min((factor - 1.0) * body.coulomb_n, room_n / 2.0, most_n))
         self._slope_n = max(0.0, room_n - self._carpet_n)
         for side in ("left", "right"):
@@ -224,22 +223,18 @@ class OrdinaryHour:
 
     def _hold(self) -> None:
         """A threshold."""
-        hardest_n = HARDEST_SHARE * self.drawn.robot.watchdog.jolt_mps2 * self._side_kg() * 2.0
-        most_n = hardest_n / len(self.drawn.robot.drives)
-        force_n = min(self.random.uniform(*HOLD_SHARE) * self.drawn.body.peak_force_n, most_n)
+        force_n = min(self.random.uniform(*HOLD_SHARE) * self.drawn.body.peak_force_n, self._edge_n())
         sides = self.random.choice((("left",), ("right",), ("left", "right")))
         self._note(f"threshold: {' and '.join(sides)} held with {force_n:.0f} N a wheel")
         self._hold_sides(sides, force_n)
         self._later(self.random.uniform(*HOLD_S), self._let_loose, sides)
         self._later(self.random.uniform(1.0, 8.0), self._hold)
 
-    def _side_kg(self) -> float:
-        """What moves with the wheels of one side while those of the other one go on, as mass at the rim."""
+    def _edge_n(self) -> float:
+        """Until it has climbed an edge of HIGHEST_M the load on a wheel holds it with weight × tan, cos = 1 - h / r."""
         body, robot = self.drawn.body, self.drawn.robot
-        mass_kg = body.mass_kg * body.payload_factor
-        turning_kg = mass_kg * (body.yaw_gyration_m / robot.base.track_m) ** 2
-        own_kg = mass_kg / 4.0 + turning_kg + body.wheel_mass_kg * len(robot.drives) / 2.0
-        return own_kg - (mass_kg / 4.0 - turning_kg) ** 2 / own_kg
+        weight_n = GRAVITY_MPS2 * body.mass_kg * body.payload_factor / len(robot.drives)
+        return weight_n * math.tan(math.acos(1.0 - HIGHEST_M / robot.base.wheel_radius_m))
 
     def _let_loose(self, sides: tuple[str, ...]) -> None:
         self._hold_sides(sides, 0.0)
@@ -297,7 +292,7 @@ class OrdinaryHour:
     def _reset(self) -> None:
         """The emergency stop ends by a reset, which needs a released joystick."""
         self.world.velocity.reset()
-        if self.world.velocity.filter.estop is not EstopState.FREE:
+        if self.world.velocity.holds_stop:
             self._later(0.5, self._reset)
 
     def _walk_by(self) -> None:

@@ -135,6 +135,11 @@ class VelocityProcess(Process):
             self._mux_told, self._mux_state_at = told, now_s
             self._topics.publish("velocity_mux/state", decision)
 
+    @property
+    def holds_stop(self) -> bool:
+        """Its emergency stop is pressed, or waits for its reset."""
+        return self.filter.estop is not EstopState.FREE
+
     def reset(self) -> None:
         """The operator resets the emergency stop; a process that is dead or hangs does not receive it."""
         if self.alive:

@@ -49,6 +49,14 @@ class Wishes:
         tells: of two hands one has shown zero since the motion of the other."""
         self._held = {topic for topic in self._arrived if self._holds_s(topic, self._arrived[topic], now_s) > 0.0}
 
+    def on_pause(self, now_s: float) -> None:
+        """The base is held by a lock, or by the absence of scans. Programs with a goal go on after it: a joystick that
+        orders motion now, or publishes nothing, counts from its next zero on."""
+        for topic, (tau_s, at) in self._arrived.items():
+            at_zero = tau_s == 0.0 and now_s <= at + self._timeouts[topic]
+            if self._neutral_after[topic] is None and not at_zero:
+                self._held.add(topic)
+
     def greatest_s(self, now_s: float) -> float:
         """τ of the greatest command that holds [s]."""
         return max(0.0 if topic in self._held else self._orders_s(topic, now_s) for topic in self._last)

@@ -52,7 +52,8 @@ HOT = {
     ),
     "canbase_campaign": (
         "action_process allowance can_bus clock disk process driver_process watchdog_process velocity_process drives "
-        "envelope excuses fault goal_judge hands intruder judged_by lidar outside plan wall_place wishes reach "
+        "envelope excuses fault goal_judge hands intruder judged_by lidar outside pause_judge plan rest_judge "
+        "wall_place wishes reach "
         "scanner shown strangers motion_judge odometry_judge judge"
     ),
 }
