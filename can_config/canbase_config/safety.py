@@ -15,7 +15,9 @@ MAX_SCANS = 8
 class Scan(Section):
     """One laser scanner that the safety filter evaluates. Its pose is written here, or read from tf_static."""
 
-    required: Annotated[bool, Field(description="true: without a fresh scan nothing moves")]
+    required: Annotated[
+        bool, Field(description="true: without a fresh scan nothing moves; false: blind_mps where it looked")
+    ]
     topic: Annotated[Topic, Field(description="sensor_msgs/LaserScan")] = "scan"
     timeout_s: Annotated[float, Field(ge=0.05, le=1.0, description="[s]")] = 0.3
     pose: Annotated[
@@ -117,13 +119,14 @@ class Safety(Section):
     stop_distance_m: Annotated[float, Field(gt=0.0, le=5.0, description="free path below: stop [m]")] = 0.15
     slow_distance_m: Annotated[float, Field(gt=0.0, le=10.0, description="free path below: slow down [m]")] = 0.6
     limit_zones: Annotated[
-        tuple[LimitZone, ...], Field(max_length=8, strict=False, description="obstacles in them limit the speed")
+        tuple[LimitZone, ...],
+        Field(
+            max_length=8, strict=False, description="obstacles in them, or places without a scanner, limit the speed"
+        ),
     ] = ()
     blind_mps: Annotated[
         float,
-        Field(
-            ge=0.0, le=0.3, description="speed limit in directions without usable readings; 0: no motion there [m/s]"
-        ),
+        Field(ge=0.0, le=0.3, description="speed limit where scanners do not cover the path; 0: no motion there [m/s]"),
     ] = 0.15
     uncommissioned_mps: Annotated[
         float,
@@ -141,10 +144,6 @@ class Safety(Section):
             "by itself when this computer fails; false: STO has to stop those that do not"
         ),
     ] = False
-    usable_share: Annotated[
-        float,
-        Field(ge=0.9, le=1.0, description="least share of usable readings, of the directions that scanners cover"),
-    ] = 0.9
 
     @property
     def scans(self) -> tuple[Scan, ...]:

@@ -52,7 +52,13 @@ class Points:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """Where a scanner looks: its place, its first beam and the angle to its last [rad], its ranges [m]."""
+    """Where a scanner looks: its place, its first beam and the angle to its last [rad], its ranges [m].
+
+    Rules of `covers`, for a place that the scanner's newest scan covers:
+    1. It is within the range of that scan, and of the first one.
+    2. A beam with a reading passes it no farther away than the beams of the first scan are apart, or than GAP_M.
+    A place nearer than range_min is covered too: what is there takes the reading from its beam.
+    """
 
     placement: Placement
     first_rad: float
@@ -62,32 +68,63 @@ class Field:
     increment_rad: float = 0.0
     says: npt.NDArray[np.intp] | None = None
     """The beams with a reading, by their number from `first_rad` on, rising. None: all of them have one."""
-
-    def sees(self, points: Floats) -> Bools:
-        """Which of these places the scanner would see, if nothing stood before them."""
-        ranges_m, _, faces = self._looks_at(points)
-        seen: Bools = faces & (ranges_m <= self.range_max_m)
-        return seen
+    first: Field | None = None
+    """Of the first scan since the start, which states where the scanner looks; None: this one is the first."""
+    topic: str = ""
 
     def faces(self, points: Floats) -> tuple[Bools, Bools]:
         """Which of these places it faces, at any range, and which of them are within its range."""
-        ranges_m, _, faces = self._looks_at(points)
+        ranges_m, from_first_rad = self.seen_from(points)
+        faces: Bools = (ranges_m >= self.range_min_m) & (from_first_rad <= self.span_rad)
         return faces, faces & (ranges_m <= self.range_max_m)
 
-    def covers(self, points: Floats) -> tuple[Bools, Bools]:
-        """Which of these places it faces, at any range, and at which of them its newest scan has a reading."""
-        ranges_m, from_first_rad, faces = self._looks_at(points)
-        told: Bools = faces & (ranges_m <= self.range_max_m)
-        if self.says is not None:
-            gaps = self._gaps(from_first_rad / self.increment_rad - 0.5)
-            told &= (gaps <= 1.0) | (gaps * self.increment_rad * ranges_m <= GAP_M)
-        return faces, told
+    def covers(self, points: Floats) -> Bools:
+        """Which of these places its newest scan covers: nothing is there, or the obstacle has a reading."""
+        ranges_m, from_first_rad = self.seen_from(points)
+        return self._near_a_beam(self._gaps_rad(from_first_rad), ranges_m)
 
-    def _looks_at(self, points: Floats) -> tuple[Floats, Floats, Bools]:
+    def claims(self, points: Floats) -> Bools:
+        """Which of these places the first scan looked at, with or without a reading."""
+        first = self.first or self
+        ranges_m, from_first_rad = first.seen_from(points)
+        claimed: Bools = (from_first_rad <= first.span_rad) & (ranges_m <= first.range_max_m)
+        return claimed
+
+    def lost(self, points: Floats) -> Bools:
+        """Which of these places the first scan looked at, and the newest one does not any more."""
+        if self.first is None or self._is_as_wide_as(self.first):
+            return np.zeros(points.shape[0], dtype=np.bool_)
+        ranges_m, from_first_rad = self.seen_from(points)
+        looked: Bools = self.claims(points) & ~self._near_a_beam(self._beside_rad(from_first_rad), ranges_m)
+        return looked
+
+    def _is_as_wide_as(self, first: Field) -> bool:
+        mine = self.placement, self.first_rad, self.span_rad, self.increment_rad
+        same = mine == (first.placement, first.first_rad, first.span_rad, first.increment_rad)
+        return same and self.range_max_m >= first.range_max_m
+
+    def _near_a_beam(self, gaps_rad: Floats, ranges_m: Floats) -> Bools:
+        first = self.first or self
+        near: Bools = (gaps_rad <= first.increment_rad) | (gaps_rad * ranges_m <= GAP_M)
+        return near & (ranges_m <= min(self.range_max_m, first.range_max_m))
+
+    def seen_from(self, points: Floats) -> tuple[Floats, Floats]:
+        """How far these places are [m], and their angle from `first_rad` on, 0 to 2π."""
         ranges_m, angles_rad = self.placement.seen_from(points)
         from_first_rad: Floats = np.mod(angles_rad - self.first_rad, FULL_TURN_RAD)
-        faces: Bools = (ranges_m >= self.range_min_m) & (from_first_rad <= self.span_rad)
-        return ranges_m, from_first_rad, faces
+        return ranges_m, from_first_rad
+
+    def _beside_rad(self, from_first_rad: Floats) -> Floats:
+        """From each of these directions to the nearest beam; between two of them half of their distance."""
+        beyond_rad = np.minimum(from_first_rad - self.span_rad, FULL_TURN_RAD - from_first_rad)
+        beside_rad: Floats = np.maximum(beyond_rad, 0.0) + self.increment_rad / 2.0
+        return beside_rad
+
+    def _gaps_rad(self, from_first_rad: Floats) -> Floats:
+        """From each of these directions to the nearest beam with a reading."""
+        if self.says is None:
+            return self._beside_rad(from_first_rad)
+        return self._gaps(from_first_rad / self.increment_rad - 0.5) * self.increment_rad
 
     def _gaps(self, at: Floats) -> Floats:
         """From each of these directions, counted in beams, to the nearest beam with a reading."""

@@ -68,6 +68,7 @@ class _Scanner:
         self._cause = StopCause.SCAN_STALE
         self._dropped = 0
         self._share: float | None = None
+        self._first: Field | None = None
 
     def receive(self, scan: Scan, placement: Placement, now_s: float, wall_s: float, *, moves: bool) -> None:
         """A scan as it came. One that cannot be used is dropped and counted."""
@@ -115,6 +116,9 @@ class _Scanner:
         since_s = min(self._seen.age_s(now_s), self.config.timeout_s)
         genuine = self._glitches.genuine(points, limits.linear_mps * since_s, limits.angular_radps * since_s)
         near = genuine[self._geometry.box.distances_m(genuine) <= self._reach_m]
+        if field is not None:
+            field = replace(field, first=self._first, topic=self.config.topic)
+            self._first = self._first or field
         from_s = now_s - min(max(scan_time_s, 0.0), self.config.timeout_s + self.config.frozen_s)
         self._seen = Received(_Seen(near, field, clearances(genuine, self._geometry.box), from_s), now_s)
         self._problem = self._why_dropped = ""
@@ -137,6 +141,11 @@ class _Scanner:
     def seen(self, now_s: float) -> _Seen | None:
         """What its last scan shows; None: that does not count, or there is none."""
         return self._seen.within(self.config.timeout_s, now_s) if self.state(now_s).is_fresh else None
+
+    @property
+    def first(self) -> Field | None:
+        """Where its first scan that counted looked; None: there was none."""
+        return self._first
 
 
 class SafetyFilter:
@@ -323,10 +332,17 @@ class SafetyFilter:
                 parts.append(pose.from_here(seen.points, there))
         known = (seen.field for scanner, seen in fresh if scanner.state(now_s).knows_age)
         fields = tuple(field for field in known if field is not None)
+        lost = (scanner.first for scanner in self._scanners.values() if scanner.seen(now_s) is None)
         sees_all = any(seen.field is None for _, seen in fresh)
         points = np.concatenate(parts) if len(parts) > 2 else parts[-1]
         ages_s = (max(now_s - seen.measured_from_s, scanner.config.timeout_s) for scanner, seen in fresh)
-        return Sight(points, () if sees_all else fields, max(ages_s, default=0.0))
+        return Sight(
+            points,
+            () if sees_all else fields,
+            max(ages_s, default=0.0),
+            tuple(field for field in lost if field is not None),
+            everywhere=sees_all,
+        )
 
     def _advance_estop(self, now_s: float) -> None:
         """A fresh zero command counts only while the emergency stop is free. In a crowd neither does a release."""

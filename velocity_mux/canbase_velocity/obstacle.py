@@ -8,9 +8,7 @@ Rules:
    the stop distance after one more period of the order, the order is zero. If it no longer does now, whatever is
    ordered, the base has to brake hard.
 3. Each scan is looked at twice: as it was taken, and as the base must see it after what was ordered since then.
-4. Where less than half of what the footprint will sweep is in the field of view of a scanner, the speed is limited.
-5. It is limited too where scanners look, and too few of their beams have a reading, until the base would stand.
-6. Where scanners look, the base is no faster than it can stop within their range, by a scan of age `Sight.age_s`.
+4. Where scanners look, the base is no faster than it can stop within their range, by a scan of age `Sight.age_s`.
 """
 
 from __future__ import annotations
@@ -24,32 +22,35 @@ from canbase_config.robot import Limits
 from canbase_config.safety import LimitZone, Safety
 from canbase_config.stopping import ramp
 from canbase_velocity.clearance import Field
-from canbase_velocity.motion import Pose
 from canbase_velocity.ramp import Moving, follow, stop_way_s
-from canbase_velocity.sweep import NO_TOUCH, Box, Floats, Touch, fastest_mps, first_touch
+from canbase_velocity.sweep import FULL_TURN_RAD, NO_TOUCH, Box, Floats, Touch, fastest_mps, first_touch
 from canbase_velocity.twist import Twist
 
-SEEN_SHARE = 0.5
-"""Rule 4: the share of the swept edge that has to be in a field of view."""
 _EDGE_POINTS = 8
 _HALVINGS = 30
 _LOOKS = 4
-"""Rules 5 and 6 look at this many places of the footprint on its path."""
+"""Rule 4 looks at this many places of the footprint on its path, at least."""
+_LOOK_RAD = 0.15
+"""So far it turns from one of them to the next one at most."""
 _RANGE_HALVINGS = 8
-"""Rule 6 finds a speed to 0.4 % of the ordered one."""
+"""Rule 4 finds a speed to 0.4 % of the ordered one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
     """What all fresh scans together show: places of obstacles in base_link [m], and where the scanners look.
 
-    `points` holds each place as scanned, and once more as the base must see it by now.
+    `points` holds each place as scanned, and once more as the base must see it by now. `fields`: of each scanner whose
+    last scan counts. `lost`: the first field of each one whose scans have counted, and do not any more.
     """
 
     points: Floats
     fields: tuple[Field, ...] = ()
     age_s: float = 0.0
     """Of the oldest first reading, at least the longest timeout of a scan, so that a limit by it is steady [s]."""
+    lost: tuple[Field, ...] = ()
+    everywhere: bool = True
+    """Without `fields`: every place is seen, or none is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,21 +144,8 @@ def brakes_too_late(moving: Moving, sight: Sight, geometry: Geometry) -> bool:
     return touch.slack_s < stop_way_s(moving, geometry.limits)
 
 
-def is_blind(order: Twist, sight: Sight, geometry: Geometry) -> bool:
-    """Rule 4: what lies before the edge of the footprint, a stop distance along the arc of `order` (not zero)."""
-    order = order.normalized()
-    ahead_s = geometry.stop_m / fastest_mps(geometry.box, order)
-    edge = geometry.box.edge(_EDGE_POINTS)
-    swept = Pose().from_here(edge, Pose().moved(order, ahead_s))
-    swept = swept[~geometry.box.contains(swept)]
-    seen = np.zeros(swept.shape[0], dtype=np.bool_)
-    for field in sight.fields:
-        seen |= field.sees(swept)
-    return bool(seen.sum() < SEEN_SHARE * swept.shape[0])
-
-
 def range_share(order: Twist, sight: Sight, geometry: Geometry) -> float:
-    """Rule 6: the share of `order` (not zero), found from below, from which the footprint stays within the range of the
+    """Rule 4: the share of `order` (not zero), found from below, from which the footprint stays within the range of the
     scanners that face its path until it is stationary; at most 1, and 0 where even the stop distance is beyond it.
 
     An obstacle just beyond the range is not in the newest scan, but in the next one, at most `sight.age_s` later.
@@ -175,44 +163,37 @@ def range_share(order: Twist, sight: Sight, geometry: Geometry) -> float:
 
 
 def _is_in_range(order: Twist, sight: Sight, geometry: Geometry) -> bool:
-    swept = _swept(order, geometry, sight.age_s)
-    faced = [field.faces(swept) for field in sight.fields]
+    places = swept(order, geometry, sight.age_s)
+    faced = [field.faces(places) for field in sight.fields]
     anyone = np.logical_or.reduce([faces for faces, _ in faced])
     near = np.logical_or.reduce([in_range for _, in_range in faced])
     return not bool((anyone & ~near).any())
 
 
-def told_share(order: Twist, sight: Sight, geometry: Geometry) -> float:
-    """Rule 5: of the places where the footprint will be until it stands, by `order` (not zero) from now on, and that a
-    scanner faces, the share that is covered by usable readings; 1 where no scanner faces any."""
-    swept = _swept(order, geometry)
-    covered = [field.covers(swept) for field in sight.fields]
-    faced = np.logical_or.reduce([faces for faces, _ in covered])
-    told = np.logical_or.reduce([told for _, told in covered])
-    return float(told.sum() / faced.sum()) if faced.any() else 1.0
-
-
-def _swept(order: Twist, geometry: Geometry, age_s: float = 0.0) -> Floats:
+def swept(order: Twist, geometry: Geometry, age_s: float = 0.0, per_side: int = _EDGE_POINTS) -> Floats:
     """Places of the edge of the footprint until it is stationary, beside where it is: by `order` from now on, which it
-    has also followed for `age_s`."""
+    has also followed for `age_s`. `per_side`: places on each side of it."""
     limits, box = geometry.limits, geometry.box
     order = order.scaled(speed_factor(order, limits.linear_mps, limits.angular_radps))
     stands_s = age_s + geometry.hold_s + geometry.reaction_s + stop_way_s(Moving(order), limits)
     way_m = geometry.stop_m + fastest_mps(box, order) * stands_s
     order = order.normalized()
     ahead_s = way_m / fastest_mps(box, order)
-    edge, start = box.edge(_EDGE_POINTS), Pose()
-    poses = (start.moved(order, ahead_s * step / _LOOKS) for step in range(1, _LOOKS + 1))
-    swept = np.concatenate([start.from_here(edge, pose) for pose in poses])
-    return swept[~box.contains(swept)]
+    places = _moved(box.edge(per_side), order, ahead_s)
+    return places[~box.contains(places)]
 
 
-def zone_factor(order: Twist, zone: LimitZone, sight: Sight) -> float:
-    """Share of `order` that the zone leaves: 1 while it is empty."""
-    box = Box(front_m=zone.front_m, rear_m=zone.rear_m, left_m=zone.left_m, right_m=zone.right_m)
-    if not box.contains(sight.points).any():
-        return 1.0
-    return speed_factor(order, zone.linear_mps, zone.angular_radps)
+def _moved(edge: Floats, order: Twist, ahead_s: float) -> Floats:
+    """The edge of the footprint at `_LOOKS` places on the arc, or more of them in a turn."""
+    turned_rad = min(abs(order.angular_radps) * ahead_s, FULL_TURN_RAD)
+    looks = max(_LOOKS, math.ceil(turned_rad / _LOOK_RAD))
+    times_s = np.arange(1, looks + 1) * (ahead_s / looks)
+    turns_rad = order.angular_radps * times_s
+    chords_m = order.linear_mps * times_s * np.sinc(turns_rad / FULL_TURN_RAD)
+    cos, sin = np.cos(turns_rad)[:, np.newaxis], np.sin(turns_rad)[:, np.newaxis]
+    x_m = edge[:, 0] * cos - edge[:, 1] * sin + (chords_m * np.cos(turns_rad / 2.0))[:, np.newaxis]
+    y_m = edge[:, 0] * sin + edge[:, 1] * cos + (chords_m * np.sin(turns_rad / 2.0))[:, np.newaxis]
+    return np.column_stack((x_m.ravel(), y_m.ravel()))
 
 
 def speed_factor(twist: Twist, linear_mps: float, angular_radps: float) -> float:

@@ -6,7 +6,8 @@ Rules, in the order of their precedence:
 2. No recent command, or one with NaN or infinity: stop.
 3. A required scan not recent, frozen, not usable, or of a scanner whose place is unknown: stop.
 4. Faster than the limits, the ceiling, a speed limit of run time, the speed of a robot that is not commissioned, a
-   limit zone with something in it, or the speed for where no scanner looks or has a reading: slower, on the same curve.
+   limit zone that is not seen to be empty, or the speed for where scanners do not cover the path: slower, on the same
+   curve. See coverage.py.
 5. Growing faster than the ceiling: slower. What falls is never held up.
 6. Obstacle where the footprint will be: slower, on the same curve, so that the base can stop before the stop distance;
    there it stops. Driving away from an obstacle is free. See obstacle.py.
@@ -27,7 +28,8 @@ from canbase_config.commissioned import uncommissioned, uncommissioned_mps
 from canbase_config.robot import Limits, Robot
 from canbase_config.safety import Ceiling, Safety
 from canbase_runtime.stop_cause import StopCause
-from canbase_velocity import obstacle
+from canbase_velocity import coverage, obstacle
+from canbase_velocity.coverage import Gap, Why
 from canbase_velocity.decision import PASSED, Action, Decision, Finding, stop
 from canbase_velocity.estop import EstopState
 from canbase_velocity.obstacle import Geometry, Sight
@@ -212,36 +214,42 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     if config.uncommissioned:
         found.append(_corners(command, config.safety.uncommissioned_mps, config, StopCause.SPEED, *_commission(config)))
     for zone in config.safety.limit_zones:
-        factor = obstacle.zone_factor(command, zone, inputs.sight)
-        found.append(_limit(command, factor, StopCause.ZONE, "nothing in the limit zone"))
+        factor = coverage.zone_factor(command, zone, inputs.sight, config.geometry)
+        found.append(_limit(command, factor, StopCause.ZONE, "a limit zone that scanners cover, and nothing in it"))
     return found + _unseen(inputs, config)
 
 
 def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
-    """Of rule 4: where no scanner looks, or where one looks and has no reading. Before any scan it does not apply."""
-    command, sight, geometry, safety = inputs.command, inputs.sight, config.geometry, config.safety
-    if _lost_all(inputs.scans):
-        return [
-            _blind(command, StopCause.BLIND, "the scans of every scanner have ended", "scans that can be used", config)
-        ]
-    aged = [scan.topic for scan in inputs.scans if scan.is_fresh and not scan.knows_age]
-    if not sight.fields:
+    """Of rule 4: where no scanner covers the path. Before any scan it does not apply."""
+    command, sight, geometry = inputs.command, inputs.sight, config.geometry
+    if all(scan.age_s == math.inf for scan in inputs.scans):
+        return []
+    found, slower = [], command
+    if sight.fields:
+        in_range = obstacle.range_share(command, sight, geometry)
+        slower = command.scaled(in_range)
+        if in_range < 1.0:
+            found.append(_out_of_range(command, in_range, sight, config))
+    gap = None if slower.is_zero else coverage.uncovered(slower, sight, geometry)
+    return found if gap is None else [*found, _not_covered(gap, inputs, config)]
+
+
+def _not_covered(gap: Gap, inputs: Inputs, config: FilterConfig) -> Finding:
+    command, topics = inputs.command, ", ".join(gap.topics)
+    if gap.why is Why.UNREAD:
+        why = f"{gap.share:.0%} of the path are covered: {topics} looks at the rest, and has no readings there"
+        return _blind(command, StopCause.SCAN_BLIND, why, "usable readings, or another direction", config)
+    if not any(scan.is_fresh for scan in inputs.scans):
+        why, cure = "the scans of every scanner have ended", "scans that can be used"
+    elif gap.why is Why.LOST:
+        why = f"{topics} looked where the command leads, and does not any more"
+        cure = f"scans on {topics} as its first one was; after a change of the scanner: a new start of canbase"
+    elif aged := [scan.topic for scan in inputs.scans if scan.is_fresh and not scan.knows_age]:
         why = f"how old the scans on {', '.join(aged)} are is unknown (same_clock false)"
         cure = "same_clock true, with clocks that agree"
-        return [_blind(command, StopCause.BLIND, why, cure, config)] if aged else []
-    found = []
-    if obstacle.is_blind(command, sight, geometry):
-        why = "no scanner looks where the command leads"
-        found.append(_blind(command, StopCause.BLIND, why, "a command to where a scanner looks", config))
-    in_range = obstacle.range_share(command, sight, geometry)
-    if in_range < 1.0:
-        found.append(_out_of_range(command, in_range, sight, config))
-    slower = command.scaled(in_range)
-    share = 1.0 if slower.is_zero else obstacle.told_share(slower, sight, geometry)
-    if share < safety.usable_share:
-        why = f"{share:.0%} of the places ahead have usable readings, at least {safety.usable_share:.0%} are needed"
-        found.append(_blind(command, StopCause.SCAN_BLIND, why, "more usable readings, or another direction", config))
-    return found
+    else:
+        why, cure = "no scanner looks where the command leads", "a command to where a scanner looks"
+    return _blind(command, StopCause.BLIND, why, cure, config)
 
 
 def _out_of_range(command: Twist, share: float, sight: Sight, config: FilterConfig) -> Finding:
@@ -252,11 +260,6 @@ def _out_of_range(command: Twist, share: float, sight: Sight, config: FilterConf
     if allowed_mps < max(config.safety.blind_mps, config.standstill_mps):
         return _blind(command, StopCause.BLIND, why, cure, config)
     return replace(_limit(command, share, StopCause.BLIND, cure), detail=f"{why}: {_allowed(command, share)}")
-
-
-def _lost_all(scans: tuple[ScanState, ...]) -> bool:
-    """None counts any more, and one did."""
-    return any(scan.age_s < math.inf for scan in scans) and not any(scan.is_fresh for scan in scans)
 
 
 def _limit(command: Twist, factor: float, cause: StopCause, clears_on: str) -> Finding:

@@ -30,7 +30,7 @@ from canbase_driver.supervision.phases import Phase
 from canbase_runtime.latch_record import CLEAR, Defect, Found
 from canbase_runtime.watchdog_view import WatchdogView
 from canbase_sim.cia301.heartbeat import HeartbeatConsumer
-from canbase_velocity import filter_state, lock, mux, neutral, obstacle, safety_filter
+from canbase_velocity import coverage, filter_state, lock, mux, neutral, obstacle, safety_filter
 from canbase_velocity.decision import PASSED
 from canbase_velocity.estop import FREE, HELD
 from canbase_velocity.frozen import FrozenWatch
@@ -238,11 +238,10 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "driver:braking": _put(Braking, "fails", lambda self, speed_mps, now_s: False),
     "filter:speed": _put(obstacle, "speed_factor", lambda twist, linear_mps, angular_radps: 1.0),
     "filter:growth": _put(safety_filter, "_growth", lambda twist, inputs, ceiling: (twist, PASSED)),
-    "filter:limit_zones": _put(obstacle, "zone_factor", lambda twist, zone, sight: 1.0),
+    "filter:limit_zones": _put(coverage, "zone_factor", lambda twist, zone, sight, geometry: 1.0),
     "filter:speed_limit": _put(safety_filter, "_lowered", lambda inputs: PASSED),
     "filter:uncommissioned": _put(safety_filter.FilterConfig, "uncommissioned", property(lambda self: "")),
     "filter:blind_mps": _put(safety_filter, "_unseen", lambda inputs, config: []),
-    "filter:unscanned": _put(obstacle, "is_blind", lambda order, sight, geometry: False),
     "filter:scan": _put(safety_filter, "_scan", lambda inputs: None),
     "filter:brakes_hard": _put(safety_filter, "brakes_hard", lambda inputs, config: False),
     "mux:lock": _put(lock.Lock, "hear", lambda self, locked, now_s: None),
@@ -272,7 +271,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "mux:timeout": _put(mux._Source, "fresh", lambda self, now_s: self.command.within(1e9, now_s)),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
-    "filter:blind": _put(obstacle, "told_share", lambda order, sight, geometry: 1.0),
+    "filter:blind": _put(coverage, "uncovered", lambda order, sight, geometry: None),
     "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
     "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
     "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now_s, wall_s: 0.0),

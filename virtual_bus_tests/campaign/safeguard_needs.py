@@ -171,7 +171,6 @@ NEEDS: tuple[Need, ...] = (
     Need("filter:speed_limit", (), undrawn="nobody publishes speed_limit"),
     Need("filter:uncommissioned", (), undrawn="every robot of the campaign is commissioned"),
     Need("filter:blind_mps", ("scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead", "scan_stale")),
-    Need("filter:unscanned", ("stick_held", "two_hands")),
     Need("filter:scan", ("scan_stale", "obstacle")),
     Need("filter:brakes_hard", ("obstacle", "estop_pressed")),
     Need("mux:lock", ("two_on_a_lock",)),

@@ -37,8 +37,8 @@ HOT = {
         "supervision.watchdog_link"
     ),
     "canbase_velocity": (
-        "base_ready changes clearance decision delay estop filter_state frozen glitch lease lock motion mux neutral "
-        "obstacle placement ramp safety_filter scan sole_publisher steady sweep twist"
+        "base_ready changes clearance coverage decision delay estop filter_state frozen glitch lease lock motion mux "
+        "neutral obstacle placement ramp safety_filter scan sole_publisher steady sweep twist"
     ),
     "canbase_action_server": (
         "along_track causes goal goal_queue goal_request goal_step inputs motion motion_limits outcome "

@@ -169,7 +169,7 @@ def _merge(values: dict[str, Any], other: dict[str, Any]) -> None:
             values[key] = value
 
 
-@pytest.mark.parametrize(("key", "value"), [("usable_share", 0.75), ("usable_share", 0.5), ("blind_mps", 3.0)])
+@pytest.mark.parametrize(("key", "value"), [("usable_share", 0.9), ("blind_mps", 3.0)])
 def test_keys_that_make_what_no_scanner_sees_count_as_free_are_refused(tmp_path: Path, key: str, value: float) -> None:
     text = sample("bench").read_text()
     assert "\nsafety:\n" in text
