@@ -13,7 +13,7 @@ from typing import Any
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import ErrorCode
 from canbase_config.robot import Robot
-from canbase_config.state_age import state_timeout_s
+from canbase_config.state_age import state_timeout_s, status_period_s
 from canbase_runtime import chain_topics
 from canbase_runtime.chain_topics import ChainTopic
 from canbase_runtime.received import NEVER, Received
@@ -72,7 +72,7 @@ DRIVER = StateTopic(
     "driver",
     ErrorCode.DRIVE_FAULT,
     "whether the drives are enabled and the watchdog runs",
-    lambda robot: state_timeout_s(1.0 / robot.rates.status_hz),
+    lambda robot: state_timeout_s(status_period_s(robot.rates)),
 )
 SAFETY = StateTopic(
     chain_topics.SAFETY_STATE,

@@ -48,13 +48,22 @@ the message names the least value that is accepted. *Sample*: the value of the b
 """
 
 
+_WITHOUT: Final = """\
+Every other key that is a time or a rate, and why no rule compares it:
+
+| key | reason |
+|---|---|
+"""
+
+
 def _reserves() -> str:
     robot = load_robot(sample("bench")).robot
     rows = [
         _ROW.format(f"`{row.key}`", _cell(row.waits_for), _cell(row.rule), _figures(robot, row))
         for row in reserves.RESERVES
     ]
-    return _RESERVES + "\n".join((*rows, ""))
+    others = [f"| `{key}` | {_cell(reason)} |" for key, reason in reserves.WITHOUT_RESERVE.items()]
+    return _RESERVES + "\n".join((*rows, "")) + "\n" + _WITHOUT + "\n".join((*others, ""))
 
 
 def _figures(robot: Robot, row: reserves.Reserve) -> str:

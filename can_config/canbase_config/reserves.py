@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from canbase_config.section import MisfitError
+from canbase_config.stopping import CYCLES_TO_SETPOINT
 from canbase_config.units import m_per_count
 from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT, STATE_PERIOD_S
 
@@ -51,6 +52,8 @@ class Reserve:
     others: tuple[str, ...]
     least: Callable[[Robot], float]
     keys: Callable[[Robot], Iterable[Loc]]
+    suffices: bool = True
+    """False: a real robot needs more, by what the file does not have; the campaign does not draw its edge."""
 
 
 def _action_sources(robot: Robot) -> Iterable[Loc]:
@@ -122,6 +125,15 @@ RESERVES: Final = (
         ("watchdog.loop_late_s",),
         lambda robot: HEARTBEATS_PER_TIMEOUT / (HEARTBEATS_PER_TIMEOUT - 1) * robot.watchdog.loop_late_s,
     ),
+    Reserve(
+        "safety.reaction_s",
+        "a command, which is on the bus after that many control cycles; the drives need their lag on top",
+        f"{CYCLES_TO_SETPOINT} / rates.control_hz",
+        ("rates.control_hz",),
+        lambda robot: CYCLES_TO_SETPOINT / robot.rates.control_hz,
+        lambda _robot: (("safety", "reaction_s"),),
+        suffices=False,
+    ),
     _row(
         "watchdog.travel_tolerance_m",
         "the encoder beside the measured velocity",
@@ -137,6 +149,45 @@ RESERVES: Final = (
         lambda robot: _increments_m(robot, COUNTS_OF_LIFE),
     ),
 )
+
+_PUBLISHER: Final = "the rate of the publisher is not in the file; two of its periods and 0.05 s are needed"
+_DRIVE: Final = "a property of the drives, which the file does not have"
+_HUMAN: Final = "how long to wait before people are informed; no stop depends on it"
+WITHOUT_RESERVE: Final = {
+    "rates.status_hz": "motor_driver/status is not published more often than odom; who waits for it computes with both",
+    "timeouts.standstill_s": "at least the time of the longest ramp: refused with the numbers of `limits`",
+    "timeouts.sdo_s": "one answer of a drive, outside the control cycle; the boot learns a longer time",
+    "timeouts.boot_s": _HUMAN,
+    "mux.twist_mux_timeout_s": "becomes the timeout_s of a source",
+    "mux.sources.….timeout_s": f"{_PUBLISHER} (a source on {ACTION_TOPIC} has a rule)",
+    "mux.sources.….neutral_after_s": "not less than the timeout_s of the source: refused with both numbers",
+    "mux.locks.….timeout_s": _PUBLISHER,
+    "safety.scan.timeout_s": _PUBLISHER,
+    "safety.scan.frozen_s": "counts with several equal scans only, whatever their rate",
+    "safety.more_scans[…].timeout_s": _PUBLISHER,
+    "safety.more_scans[…].frozen_s": "counts with several equal scans only, whatever their rate",
+    "safety.estop.timeout_s": _PUBLISHER,
+    "watchdog.latency_s": "added to timeouts.command_s, which has a rule",
+    "watchdog.drive_lag_s": _DRIVE,
+    "watchdog.motion_missing_s": "counts after watchdog.drive_lag_s, and with a travel (motion_missing_m, above)",
+    "watchdog.stand_impulse_s": _DRIVE,
+    "watchdog.stand_answer_s": _DRIVE,
+    "watchdog.slow_wheel_s": "counts after watchdog.drive_lag_s; its least value is two control cycles at 20 Hz",
+    "watchdog.twist_s": "counts after watchdog.drive_lag_s; its least value is two control cycles at 20 Hz",
+    "watchdog.bus_failed_s": f"the watchdog sends every {STATE_PERIOD_S:g} s at least; the range begins above",
+    "action.client_lease_s": "the client publishes at a third of its least value",
+    "action.feedback_hz": "feedback is sent in a control cycle, so at most at action.control_hz; no decision",
+    "action.progress_timeout_s": "how long a goal may go on without 1 mm of travel; the speed decides what is enough",
+    "action.overall_extra_s": "added to a computed time",
+    "health.stall_time_s": _DRIVE,
+    "drives[…].values[…].period_s": "rounded to whole control cycles; published only",
+    "sdo.timeout_s": "a property of the drive; replaces timeouts.sdo_s",
+    "sdo.gap_s": _DRIVE,
+    "start.boot_up_s": _DRIVE,
+    "start.settle_s": _DRIVE,
+    "self_stop.vendor_watchdog.per_s": "the value that means one second to the drive: a unit, no time",
+}
+"""Every other key that is a time or a rate, and why no rule compares it. A test finds the keys in the model."""
 
 
 def check(robot: Robot) -> None:

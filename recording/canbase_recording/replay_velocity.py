@@ -115,7 +115,7 @@ def _cores(config: VelocityConfig) -> tuple[Mux, SafetyFilter]:
         config.mux.sources,
         config.mux.locks,
         foreign_lock=config.mux.foreign_publishers == "lock",
-        status_timeout_s=status_timeout_s(config.rates.status_hz),
+        status_timeout_s=status_timeout_s(config.rates),
     )
     return mux, SafetyFilter(needs, Found())
 

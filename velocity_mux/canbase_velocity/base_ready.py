@@ -6,18 +6,20 @@ its cycles from the start again was restarted: that is not ready either, also wh
 
 from __future__ import annotations
 
+from canbase_config.robot import Rates
+from canbase_config.state_age import status_period_s
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.received import NEVER, Received
 
 STATUS_TIMEOUT_S = 0.5
 STATUS_PERIODS = 2.5
-"""A status counts for STATUS_TIMEOUT_S, or for this many of its periods where rates.status_hz is low."""
+"""A status counts for STATUS_TIMEOUT_S, or for this many of its periods where it is published seldom."""
 ESTOP_HOLDS = "the emergency stop is pressed or not reset"
 
 
-def status_timeout_s(status_hz: float) -> float:
-    """How long one motor_driver/status counts [s]. `status_hz`: rates.status_hz."""
-    return max(STATUS_TIMEOUT_S, STATUS_PERIODS / status_hz)
+def status_timeout_s(rates: Rates) -> float:
+    """How long one motor_driver/status counts [s]."""
+    return max(STATUS_TIMEOUT_S, STATUS_PERIODS * status_period_s(rates))
 
 
 class BaseReady:

@@ -82,7 +82,7 @@ class MuxNode(Node):
             robot.mux.sources,
             robot.mux.locks,
             foreign_lock=robot.mux.foreign_publishers == "lock",
-            status_timeout_s=status_timeout_s(robot.rates.status_hz),
+            status_timeout_s=status_timeout_s(robot.rates),
         )
         self._watch = ForeignWatch(expected(robot, self))
         self._heard = heard(robot)

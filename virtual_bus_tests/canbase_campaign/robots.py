@@ -41,6 +41,8 @@ EDGE_EVERY = 8
 """One robot of so many has every timeout as short, and its encoders as coarse, as `canbase config check` accepts."""
 LEAST_TIMEOUT_S = 0.05
 """The ranges of timeouts begin there."""
+EDGES = tuple(row for row in RESERVES if row.suffices)
+"""The rows whose least value is enough for every robot."""
 BITRATES = (125_000, 250_000, 500_000, 1_000_000)
 STOP_THEMSELVES = ("generic", "epos4", "nanotec", "elmo_gold", "kinco", "technosoft", "inverter")
 """Kinds whose drives stop when their masters die: 1016h or node guarding, with 6007h."""
@@ -90,7 +92,7 @@ def draw_robot(number: int, payload: float | None = None) -> DrawnRobot:
     raise RuntimeError(f"robot {number}: none of {TRIES} drawn files passes robot.yaml's checks")
 
 
-def at_edges(robot: Robot, rows: Sequence[Reserve] = RESERVES) -> Robot:
+def at_edges(robot: Robot, rows: Sequence[Reserve] = EDGES) -> Robot:
     """The same robot with each of these keys at the least value that its file may have; its encoders are as coarse as
     their tolerances allow. What another row demands then is raised to that row's least value."""
     coarse = _coarsened(robot, [row for row in rows if COUNTS in row.others])
@@ -99,7 +101,7 @@ def at_edges(robot: Robot, rows: Sequence[Reserve] = RESERVES) -> Robot:
         if COUNTS not in row.others:
             for loc in row.keys(coarse):
                 _set(values, loc, LEAST_TIMEOUT_S)
-    for row in RESERVES:
+    for row in EDGES:
         least = rounded_up(row.least(coarse))
         for loc in row.keys(coarse):
             _set(values, loc, max(least, at(values, loc)))

@@ -63,7 +63,7 @@ class VelocityProcess(Process):
     def begin(self) -> None:
         """A new mux and a new filter; the sequence of the leases starts again."""
         now_s = self.clock.now_s
-        self.mux = Mux(self._robot.mux.sources, LOCKS, status_timeout_s=status_timeout_s(self._robot.rates.status_hz))
+        self.mux = Mux(self._robot.mux.sources, LOCKS, status_timeout_s=status_timeout_s(self._robot.rates))
         self.filter = SafetyFilter(FilterConfig.of(self._robot), self.disk.found())
         self._sequence, self._stamp_ns, self._ending = 0, 0, False
         self.decision: Decision | None = None

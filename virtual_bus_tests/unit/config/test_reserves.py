@@ -8,11 +8,14 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from canbase_campaign.robots import at_edges, draw_robot
+from canbase_campaign.robots import EDGES, at_edges, draw_robot
 from canbase_config.errors import Loc
 from canbase_config.load import load_robot, sample
-from canbase_config.reserves import COUNTS, RESERVES, Reserve, at, rounded_up
-from canbase_config.robot import Robot
+from canbase_config.profile_file import PROFILE_SCHEMA
+from canbase_config.reserves import COUNTS, RESERVES, WITHOUT_RESERVE, Reserve, at, rounded_up
+from canbase_config.robot import Rates, Robot
+from canbase_config.schema import Schema
+from canbase_config.state_age import status_period_s
 
 SLOW: dict[str, Any] = {"control_hz": 20.0, "command_hz": 20.0, "odometry_hz": 5.0}
 FAST: dict[str, Any] = {"control_hz": 200.0, "command_hz": 100.0, "odometry_hz": 100.0}
@@ -28,7 +31,7 @@ def bench(rates: dict[str, Any], counts: int) -> dict[str, Any]:
     values["timeouts"] |= dict.fromkeys(("command_s", "lease_s", "feedback_s", "watchdog_s"), 0.5)
     values["timeouts"] |= {"drive_heartbeat_s": 1.0, "odometry_s": 1.0}
     values["watchdog"] |= {"travel_tolerance_m": 0.5, "motion_missing_m": 0.1}
-    values["safety"]["command_timeout_s"] = 0.5
+    values["safety"] |= {"command_timeout_s": 0.5, "reaction_s": 0.5}
     return values
 
 
@@ -40,7 +43,12 @@ def put(values: dict[str, Any], loc: Loc, value: float) -> None:
 
 def in_range(key: str, value: float) -> bool:
     """Whether the range of the key itself, which is checked before, allows it."""
-    low = {"watchdog.motion_missing_m": 0.001, "watchdog.travel_tolerance_m": 0.005, "timeouts.feedback_s": 0.02}
+    low = {
+        "watchdog.motion_missing_m": 0.001,
+        "watchdog.travel_tolerance_m": 0.005,
+        "timeouts.feedback_s": 0.02,
+        "safety.reaction_s": 0.01,
+    }
     return value >= low.get(key, 0.05)
 
 
@@ -96,6 +104,7 @@ def test_the_least_values_of_the_sample_robot() -> None:
             ("timeouts.feedback_s", "rates.control_hz"): 0.05,
             ("timeouts.drive_heartbeat_s", "rates.control_hz"): 0.05,
             ("timeouts.drive_heartbeat_s", "watchdog.loop_late_s"): 0.15,
+            ("safety.reaction_s", "rates.control_hz"): 0.02,
             ("watchdog.travel_tolerance_m", COUNTS): 4.0 * increment_m,
             ("watchdog.motion_missing_m", COUNTS): 8.0 * increment_m,
         }
@@ -126,9 +135,36 @@ def test_a_source_of_another_topic_may_have_any_timeout() -> None:
 def test_a_drawn_robot_with_all_keys_at_their_edges_is_one_that_the_check_accepts(number: int) -> None:
     robot = at_edges(draw_robot(number).robot)
 
-    for row in RESERVES:
+    for row in EDGES:
         for loc in row.keys(robot):
             assert row.least(robot) <= at(robot, loc) + 1e-9
     coarse = [row for row in RESERVES if COUNTS in row.others]
     used = max(row.least(robot) / at(robot, loc) for row in coarse for loc in row.keys(robot))
     assert 0.3 < used <= 1.0 + 1e-6  # as coarse as whole increments allow
+
+
+def times_and_rates() -> set[str]:
+    """Every key of robot.yaml and of a drive profile whose name says that it is a time or a rate, by the models."""
+    sections = (*Schema(Robot).sections, *PROFILE_SCHEMA.sections)
+    return {f"{path}.{key}" for path, keys in sections for key in keys if key.endswith(("_s", "_ms", "_us", "_hz"))}
+
+
+def test_each_time_and_rate_has_a_rule_or_the_reason_why_it_has_none() -> None:
+    with_rule = {key for row in RESERVES for key in (row.key, *row.others)}
+    assert len(times_and_rates()) > 40
+    assert times_and_rates() - with_rule - set(WITHOUT_RESERVE) == set()
+    assert set(WITHOUT_RESERVE) - times_and_rates() == set()
+    assert set(WITHOUT_RESERVE) & with_rule <= {"mux.sources.….timeout_s"}
+    assert all(len(reason) > 20 for reason in WITHOUT_RESERVE.values())
+
+
+@pytest.mark.parametrize(
+    ("control_hz", "odometry_hz", "status_hz", "period_s"),
+    [(100.0, 50.0, 10.0, 0.1), (100.0, 50.0, 50.0, 0.02), (100.0, 5.0, 50.0, 0.2), (20.0, 100.0, 50.0, 0.05),
+     (70.0, 20.0, 20.0, 4 / 70)],
+)  # fmt: skip
+def test_the_status_of_the_driver_is_not_published_more_often_than_odometry(
+    control_hz: float, odometry_hz: float, status_hz: float, period_s: float
+) -> None:
+    rates = Rates(control_hz=control_hz, odometry_hz=odometry_hz, status_hz=status_hz)
+    assert status_period_s(rates) == pytest.approx(period_s)

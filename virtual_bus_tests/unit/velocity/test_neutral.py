@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canbase_config.mux import DEFAULT_SOURCES
+from canbase_config.robot import Rates
 from canbase_runtime.driver_state import DriverState, driver_state
 from canbase_runtime.source_standing import SourceStanding
 from canbase_velocity.base_ready import STATUS_TIMEOUT_S, BaseReady, status_timeout_s
@@ -179,7 +180,9 @@ def test_a_status_counts_until_exactly_its_timeout(age_s: float, problem: str) -
 
 
 def test_the_status_timeout_covers_a_slow_status() -> None:
-    assert [status_timeout_s(hz) for hz in (50.0, 10.0, 5.0, 1.0)] == [0.5, 0.5, 0.5, 2.5]
+    periods = [status_timeout_s(Rates(status_hz=hz)) for hz in (50.0, 10.0, 5.0, 1.0)]
+    assert periods == pytest.approx([0.5, 0.5, 0.5, 2.5])
+    assert status_timeout_s(Rates(status_hz=50.0, odometry_hz=2.0)) == pytest.approx(1.25)
 
 
 @pytest.mark.parametrize(("absent_s", "silence_s", "armed"), [
