@@ -1,15 +1,19 @@
-"""`canbase support-bundle`: one file with all that remote help needs. What is collected: `bundle_contents.py`."""
+"""`canbase support-bundle`: one file with all that remote help needs.
+
+What is collected: `bundle_contents.py`. What is shown of it: `bundle_filter.py`; no text gets into the bundle without.
+"""
 
 from __future__ import annotations
 
 import io
 import os
 import platform
+import re
 import subprocess
 import sys
 import tarfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from importlib.metadata import distributions
 from pathlib import Path
@@ -20,8 +24,9 @@ import typer
 
 from canbase_doctor import bundle_contents as support
 from canbase_doctor.bounded_run import run
+from canbase_doctor.bundle_filter import LINES, Filter, environment, journal_text, matching, names_of
+from canbase_doctor.bundle_words import Words, own_words
 from canbase_doctor.careful_read import RefusedError, modified, names, read_end
-from canbase_doctor.redact import cleaned
 from canbase_doctor.service_environment import service_environment
 from canbase_runtime.terminal import FAILED, colour, fail
 
@@ -38,37 +43,42 @@ ETC: Final = Path("/etc/canbase")
 UNITS: Final = Path("/etc/systemd/system")
 PARTS: Final = ("driver", "watchdog", "velocity")
 """Whose records of stops there are."""
+ROBOT_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+PACKAGE: Final = re.compile(r"[A-Za-z0-9_.-]{1,60}==[0-9][0-9A-Za-z.!]{0,30}(?:\+[0-9a-z.]{1,12})?")
 _KEY: Final = "it may be a key; such files are never taken"
 
 
 class Bundle:
     """What was collected, in memory, and what was not and why."""
 
-    def __init__(self) -> None:
+    def __init__(self, names: Iterable[str] = ()) -> None:
+        """`names`: of the robot."""
+        self.filter = Filter(own_words().also(names))
         self.files: dict[str, bytes] = {}
         self.taken: dict[str, str] = {}
         self.missing: dict[str, str] = {}
 
     def text(self, name: str, what: str, read: Callable[[], str]) -> None:
-        """One file, cleaned; an OSError of `read` is the reason why it is missing."""
+        """One file as `read` shows it; its OSError is the reason why the file is missing."""
         if len(self.files) >= MOST_FILES or sum(map(len, self.files.values())) >= TOTAL_BYTES:
             self.missing[name] = f"{what}: the bundle is full ({MOST_FILES} files, {TOTAL_BYTES // 1_000_000} MB)"
             return
         try:
             content = read()
         except OSError as error:
-            self.missing[name] = f"{what}: {error.strerror or error}"
+            self.missing[name] = f"{what}: {error.strerror or type(error).__name__}"
             return
-        self.files[name] = cleaned(content).encode()[-LIMIT_BYTES:]
+        self.files[name] = content.encode(errors="replace")[-LIMIT_BYTES:]
         self.taken[name] = what
 
-    def file(self, name: str, path: Path) -> None:
+    def file(self, name: str, path: Path, show: Callable[[str], str]) -> None:
         """A regular file of this computer, if its name is allowed, where it really is too. No link is followed."""
-        self.text(name, str(path), lambda: _regular(path))
+        self.text(name, support.shown_place(path), lambda: show(_regular(path)))
 
     def output(self, command: support.Command) -> None:
         """The output of a program; one that reports nothing is missing, with its last output."""
-        shown = " ".join(command.argv) + (", in the services' environment" if command.environment is not None else "")
+        shown = f"{command.argv[0]} …" if command.argv[0] != sys.executable else "canbase …"
+        shown += ", in the services' environment" if command.environment is not None else ""
         try:
             code, said, complaint = run(command.argv, command.environment, command.timeout_s, LIMIT_BYTES)
         except OSError as error:
@@ -77,10 +87,13 @@ class Bundle:
             self.missing[command.file] = f"{shown}: not done within {command.timeout_s:.0f} s"
         else:
             if said.strip():
-                self.text(command.file, f"{shown} (exit code {code})", lambda: said + complaint)
+                more = self.filter.words.lines(complaint)
+                self.text(
+                    command.file, f"{shown} (exit code {code})", lambda: self.filter.output(command.file, said) + more
+                )
             else:
                 last = complaint.strip().splitlines()[-1:] or ["no output"]
-                self.missing[command.file] = f"{shown}: exit code {code}, {cleaned(last[0])}"
+                self.missing[command.file] = f"{shown}: exit code {code}, {self.filter.words.line(last[0])}"
 
     def write(self, path: Path) -> None:
         """As path, a .tar.gz that its owner alone may read, and that appears whole or not at all."""
@@ -118,25 +131,34 @@ def collect(
 
     `robot`: None where robot.yaml is of no use, for the reasons in `problems`; then the recordings of all robots count.
     """
-    bundle = Bundle()
+    bundle = Bundle(names_of(robot.model_dump(mode="json")) if robot else ())
+    shown = bundle.filter
     if problems:
-        bundle.text("config/problems.txt", f"what is wrong with {config}", lambda: problems)
+        bundle.text(
+            "config/problems.txt",
+            "what is wrong with robot.yaml",
+            lambda: shown.words.lines(problems.replace(str(config), "robot.yaml")),
+        )
     bundle.text("versions/canbase.txt", "canbase, Python, computer", _versions)
     bundle.text("versions/packages.txt", "Python packages", _packages)
-    bundle.text("environment.txt", "variables of ROS and canbase", lambda: support.environment_text(os.environ))
-    bundle.file("config/robot.yaml", config)
-    for name, path in named.items():
-        outside = ".." in Path(name).parts or Path(name).is_absolute()
-        bundle.file(f"config/elsewhere/{path.name}" if outside else f"config/{name}", path)
-    for path in _listed(bundle, "config/installed", etc, (".yaml", ".env")):
-        bundle.file(f"config/installed/{path.name}", path)
-    for path in _listed(bundle, "config/installed/installed", etc / "installed", (".txt",)):
-        bundle.file(f"config/installed/installed/{path.name}", path)
+    bundle.text("environment.txt", "variables of ROS and canbase", lambda: environment(os.environ))
+    bundle.file("config/robot.yaml", config, shown.configuration)
+    for number, path in enumerate(named.values()):
+        bundle.file(f"config/named_{number + 1}.yaml", path, shown.configuration)
+    for path in _listed(bundle, "config/installed", etc / "installed", (".txt",)):
+        if ROBOT_NAME.fullmatch(path.stem) is None:
+            continue
+        bundle.file(f"config/installed/{path.name}", path, partial(matching, LINES["config/installed"]))
+        bundle.file(f"config/installed/{path.stem}.yaml", etc / f"{path.stem}.yaml", shown.configuration)
+        bundle.file(f"config/installed/{path.stem}.env", etc / f"{path.stem}.env", shown.settings)
     _black_boxes(bundle, robot, state)
     _records(bundle, robot.name if robot else config.stem, state)
     services = doctor_environment(config, robot.name if robot else config.stem, etc)
     for command in support.commands(config, since, services):
         bundle.output(command)
+    if "journal/canbase.json" in bundle.files:
+        entries = bundle.files["journal/canbase.json"].decode()
+        bundle.text("journal/canbase.txt", "canbase.json, for people", lambda: journal_text(entries))
     return bundle
 
 
@@ -164,9 +186,9 @@ def _listed(bundle: Bundle, name: str, folder: Path, suffixes: tuple[str, ...]) 
     try:
         return [folder / file for file in names(folder) if file.endswith(suffixes)]
     except FileNotFoundError:
-        bundle.missing[name] = f"{folder}: nothing is installed"
+        bundle.missing[name] = f"{support.shown_place(folder)}: nothing is installed"
     except OSError as error:
-        bundle.missing[name] = f"{folder}: not readable: {error.strerror}; try sudo"
+        bundle.missing[name] = f"{support.shown_place(folder)}: not readable: {error.strerror}; try sudo"
     return []
 
 
@@ -183,11 +205,13 @@ def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
     newest = support.newest_boxes(robot.name if robot else "", found)
     if not newest:
         whose = f"of {robot.name}" if robot else "of any robot"
-        bundle.missing["black_box"] = f"no recording of a stop {whose} in {', '.join(map(str, folders))}"
-    for path in newest:
-        bundle.file(f"black_box/{path.name}", path)
+        bundle.missing["black_box"] = f"no recording of a stop {whose} in {_shown(folders)}"
+    for number, path in enumerate(newest):
+        name = support.box_name(path, number + 1, bundle.filter.words)
+        show = bundle.filter.recording if path.suffix == ".asc" else bundle.filter.json_lines
+        bundle.file(f"black_box/{name}{path.suffix}", path, show)
         if os.path.lexists(beside := path.with_suffix(".json")):
-            bundle.file(f"black_box/{beside.name}", beside)
+            bundle.file(f"black_box/{name}.json", beside, bundle.filter.json_file)
 
 
 def _records(bundle: Bundle, robot: str, state: Path) -> None:
@@ -200,14 +224,17 @@ def _records(bundle: Bundle, robot: str, state: Path) -> None:
     }
     found = {name: path for name, path in places.items() if os.path.lexists(path)}
     for name, path in found.items():
-        bundle.text(name, str(path), partial(_record_text, path, robot))
+        bundle.text(name, support.shown_place(path), partial(_record_text, path, robot, bundle.filter.words))
     if not found:
-        bundle.missing["stops"] = f"no record of stops of {robot} in {', '.join(map(str, folders.values()))}"
+        bundle.missing["stops"] = f"no record of stops of {robot} in {_shown(folders.values())}"
 
 
-def _record_text(path: Path, robot: str) -> str:
+def _shown(paths: Iterable[Path]) -> str:
+    return ", ".join(support.shown_place(path) for path in paths)
+
+
+def _record_text(path: Path, robot: str, words: Words) -> str:
     from canbase_runtime import latch_record
-    from canbase_runtime.foreign_text import printable
     from canbase_runtime.latch_file import machine
 
     _, content = read_end(path, latch_record.SIZE + 1)
@@ -217,9 +244,9 @@ def _record_text(path: Path, robot: str) -> str:
     lines = (
         f"needs a reset: {'yes' if found.latched else 'no'}",
         f"mark: {record.mark.name}, code {record.code}, written {found.sequence} times, last at {changed}",
-        f"cause: {printable(record.cause)}",
-        f"detail: {printable(record.detail)}",
-        f"defect: {found.defect.value} {found.detail}",
+        f"cause: {words.line(record.cause)}",
+        f"detail: {words.line(record.detail)}",
+        f"defect: {found.defect.value}",
     )
     return "".join(f"{line.rstrip()}\n" for line in lines)
 
@@ -234,17 +261,17 @@ def _box_folders(robot: Robot | None, state: Path) -> list[Path]:
 def _versions() -> str:
     from canbase_runtime.version import installed_version, is_compiled
 
-    ros = os.environ.get("ROS_DISTRO", "not sourced (the wheels of PyPI, if any)")
+    ros = "sourced" if os.environ.get("ROS_DISTRO") else "not sourced (the wheels of PyPI, if any)"
     collected = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    python = f"Python {sys.version}\n{sys.executable}"
+    python = f"Python {sys.version}"
     form = ", compiled" if is_compiled() else ""
     return f"canbase {installed_version()}{form}\n{python}\n{platform.platform()}\nROS {ros}\ncollected {collected}\n"
 
 
 def _packages() -> str:
     """As `pip list --format=freeze` has it, without a process that could be another pip."""
-    found = {(dist.metadata["Name"] or "?", dist.version) for dist in distributions()}
-    return "".join(f"{name}=={version}\n" for name, version in sorted(found))
+    found = sorted({(dist.metadata["Name"] or "?", dist.version) for dist in distributions()})
+    return "".join(f"{name}=={version}\n" for name, version in found if PACKAGE.fullmatch(f"{name}=={version}"))
 
 
 def support_bundle(

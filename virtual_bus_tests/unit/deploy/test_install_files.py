@@ -6,6 +6,7 @@ import stat
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
 from canbase_cli.main import app
@@ -164,15 +165,14 @@ def test_a_profile_beside_robot_yaml_is_not_taken_for_a_robot(tmp_path: Path, ro
     assert installed_robot(tmp_path / "none") is None
 
 
-def test_the_support_bundle_has_them_where_its_robot_yaml_finds_them(
-    robot: Path, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_support_bundle_has_them(robot: Path, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("canbase_doctor.bundle_contents.commands", lambda *_: ())
     loaded = load_robot(robot)
 
     bundle = collect(loaded.robot, robot, "-1h", root / "etc/canbase", root / "state", loaded.files)
 
-    assert bundle.files["config/drives/mine.yaml"] == PROFILE.encode()
+    yaml = YAML(typ="safe")
+    assert yaml.load(bundle.files["config/named_1.yaml"]) == yaml.load(PROFILE) | {"title": "…"}
 
 
 @pytest.mark.parametrize("name", ["example.env", "other.env", "example.yaml.old", "drives/.yaml"])

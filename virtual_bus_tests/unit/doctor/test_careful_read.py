@@ -98,7 +98,7 @@ def test_a_link_of_root_into_the_keys_opens_nothing(tmp_path: Path) -> None:
     (tmp_path / "harmless").symlink_to("keys")
     bundle = Bundle()
 
-    bundle.file("x", tmp_path / "harmless" / "policy.yaml")
+    bundle.file("x", tmp_path / "harmless" / "policy.yaml", str)
 
     assert bundle.missing["x"].endswith("it may be a key; such files are never taken")
 
@@ -168,7 +168,7 @@ def test_a_robot_yaml_with_mistakes_is_collected_with_them(
     with tarfile.open(output) as archive:
         problems = archive.extractfile("b/config/problems.txt")
         assert problems is not None
-        assert str(config) in problems.read().decode()
+        assert "robot.yaml:" in problems.read().decode()
         assert {"b/config/robot.yaml", "b/system/kernel.txt"} <= set(archive.getnames())
 
 
@@ -176,7 +176,7 @@ def test_of_a_robot_without_a_name_all_recordings_count(state: Path) -> None:
     bundle = collect(None, state / "robot.yaml", "-1h", state / "etc", state, problems="broken")
 
     assert "black_box/stop_bench_5.asc" in bundle.files
-    assert bundle.files["config/problems.txt"] == b"broken"
+    assert bundle.files["config/problems.txt"] == b"broken\n"
 
 
 def test_the_records_of_stops_are_taken_in_words_and_name_no_computer(state: Path) -> None:
@@ -194,7 +194,7 @@ def test_the_records_of_stops_are_taken_in_words_and_name_no_computer(state: Pat
 
     text = bundle.files["stops/installed/driver.txt"].decode()
     assert text.startswith("needs a reset: yes\nmark: LATCHED, code 7, written 3 times, last at 2")
-    assert "cause: drive fault\ndetail: left_wheel: EMCY 2310h" in text
+    assert "cause: drive fault\ndetail: …\n" in text
     assert "\x1b" not in text
     assert "abcdef" not in text
     assert bundle.files["stops/installed/watchdog.txt"].startswith(b"needs a reset: no\nmark: CLEAR")

@@ -15,13 +15,13 @@ from canbase_doctor.bundle_contents import (
     Command,
     allowed,
     commands,
-    environment_text,
     manifest,
     newest_boxes,
 )
 from canbase_doctor.support_bundle import Bundle, collect
 
 ROBOT = load_robot(sample("bench")).robot
+BOX = "stop_bench_20261124T210355.879Z_drive_silent"
 KEY = "-----BEGIN EC PRIVATE KEY-----\nMHcCAQEE\n-----END EC PRIVATE KEY-----\n"
 
 
@@ -38,11 +38,6 @@ def test_files_that_may_be_keys_are_not_allowed(name: str) -> None:
 )
 def test_ordinary_files_are_allowed(name: str) -> None:
     assert allowed(Path(name))
-
-
-def test_the_environment_has_what_matters_to_ros_and_nothing_else() -> None:
-    given = {"ROS_DOMAIN_ID": "7", "CANBASE_OPTIONS": "", "HOME": "/root", "AWS_SECRET": "x", "RMW_IMPLEMENTATION": "r"}
-    assert environment_text(given) == "CANBASE_OPTIONS=\nRMW_IMPLEMENTATION=r\nROS_DOMAIN_ID=7\n"
 
 
 def test_the_newest_recordings_of_this_robot_are_taken() -> None:
@@ -73,13 +68,15 @@ def test_an_installed_robot_is_collected_without_its_keys(tmp_path: Path) -> Non
         folder.mkdir(parents=True)
     (etc / "robot.yaml").write_text("name: bench\npassword: hunter2\n")
     (etc / "robot.env").write_text("CANBASE_OPTIONS=\n")
+    (etc / "installed" / "robot.txt").write_text("")
+    (etc / "installed" / "stolen.txt").write_text("")
     (etc / "keys" / "key.pem").write_text(KEY)
     (etc / "stolen.yaml").symlink_to(etc / "keys" / "key.pem")
-    (state / "stop_bench_1.asc").write_text("date\n")
-    (state / "stop_bench_1.json").write_text("{}\n")
+    (state / f"{BOX}.asc").write_text("date\n")
+    (state / f"{BOX}.json").write_text("{}\n")
     bundle = collect(ROBOT, etc / "robot.yaml", "-1h", etc, state)
-    assert {"config/robot.yaml", "config/installed/robot.env", "black_box/stop_bench_1.asc"} <= set(bundle.files)
-    assert bundle.files["black_box/stop_bench_1.json"] == b"{}\n"
+    assert {"config/robot.yaml", "config/installed/robot.env", f"black_box/{BOX}.asc"} <= set(bundle.files)
+    assert bundle.files[f"black_box/{BOX}.json"] == b"{}\n"
     everything = b"".join(bundle.files.values())
     assert b"hunter2" not in everything
     assert b"PRIVATE KEY" not in everything
@@ -120,8 +117,8 @@ def test_the_archive_is_the_owners_alone_and_whole(tmp_path: Path) -> None:
 def test_units_journal_and_can_statistics_are_asked_for() -> None:
     asked = {command.file: " ".join(command.argv) for command in commands(Path("r.yaml"), "-1h")}
     assert "--unit=canbase*" in asked["journal/canbase.json"]
-    assert "-statistics" in asked["can/interfaces.txt"]
-    assert asked["units/status.txt"].startswith("systemctl status")
+    assert "-statistics" in asked["can/interfaces.json"]
+    assert asked["units/status.txt"].startswith("systemctl show")
     assert "doctor --config r.yaml" in asked["doctor.txt"]
 
 
