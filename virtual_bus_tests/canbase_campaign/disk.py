@@ -11,11 +11,11 @@ FULL = "the record of stops cannot be written: no space left on device"
 
 
 class _File:
-    """One file, clear at first. `writable` False: it cannot be written from now on."""
+    """One file, clear at first. `writable` False: it cannot be written from now on. `hangs`: no write ends."""
 
     def __init__(self, clear: bytes) -> None:
         self.data: bytearray | None = bytearray(clear)
-        self.writable = True
+        self.writable, self.hangs = True, False
         self._sequence = 2
 
     def put(self, page: bytes, sequence: int) -> None:
@@ -49,9 +49,11 @@ class StopDisk:
         return self.found().defect is Defect.NONE
 
     def write(self, record: Record) -> tuple[Record | None, str]:
-        """On disk at once; the report to the part."""
+        """On disk at once, or not before the disk answers again; the report to the part."""
         if not self.file.writable:
             return None, FULL
+        if self.file.hangs:
+            return self._last, ""
         if record is not self._last:
             self._last = record
             self.file.put(latch_record.slot(record, self.file.next, self._owner), self.file.next)
@@ -76,9 +78,11 @@ class WatchdogDisk:
         return not self.past().problem
 
     def write(self, entry: Entry) -> tuple[Entry | None, str]:
-        """On disk at once; the report to the watchdog."""
+        """On disk at once, or not before the disk answers again; the report to the watchdog."""
         if not self.file.writable:
             return None, FULL
+        if self.file.hangs:
+            return self._last, ""
         if entry is not self._last:
             self._last = entry
             self.file.put(latch.page(entry, self.file.next, self._owner), self.file.next)

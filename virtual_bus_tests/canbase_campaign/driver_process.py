@@ -47,6 +47,8 @@ class DriverProcess(Process):
         """It sends no setpoints with this identifier; 0: it sends all."""
         self.never_lets_go = False
         """At a stand it leaves the power on, where it should take it off for a moment."""
+        self.ros_stalls = False
+        """The thread of its topics stands still; the one of the bus goes on."""
         self.asked = ""
         """It was requested to stop, or to give up the power: until a reset or an activation. Empty: it was not."""
         self.heartbeats = True
@@ -123,6 +125,8 @@ class DriverProcess(Process):
             self._send(self.core.on_frame(Frame(cob_id, data), self.clock.now_s))
 
     def _on_command(self, twist: Twist) -> None:
+        if self.ros_stalls:
+            return
         if self.keeps_motion and twist.is_zero:
             twist = self._moves
         self._moves = twist
@@ -135,7 +139,8 @@ class DriverProcess(Process):
         self.core.on_record(*self.disk.write(self.core.record))
         self._send(self._changed(frames))
         self._cycle += 1
-        self._publish(now_s)
+        if not self.ros_stalls:
+            self._publish(now_s)
         if self.core.finished:  # as loop.py does
             self.die()
 

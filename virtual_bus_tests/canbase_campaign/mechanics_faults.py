@@ -44,10 +44,20 @@ def _put_down(base: Base, side: str) -> None:
 
 def _uncouple(world: World, around: Surroundings, given: Arguments) -> None:
     axis = world.drives.axis(given["wheel"])
-    if not axis.uncoupled:
+    loose = any(rotor.motor is axis.motor for rotor in world.drives.bench.base.loose_rotors)
+    if not axis.uncoupled and not loose:
         axis.uncoupled = True
         rotor = world.drives.bench.base.uncouple(axis.motor)
         axis.encoder.follow(lambda: rotor.travel_m)
+
+
+def _loosen(world: World, around: Surroundings, given: Arguments) -> None:
+    axis, base = world.drives.axis(given["wheel"]), world.drives.bench.base
+    if axis.uncoupled or any(rotor.motor is axis.motor for rotor in base.loose_rotors):
+        return
+    rotor = base.loosen(axis.motor, given["play_m"])
+    axis.encoder.follow(lambda: rotor.travel_m)
+    base.resting = False
 
 
 def _push(world: World, around: Surroundings, given: Arguments) -> None:
@@ -75,6 +85,9 @@ MECHANICS_FAULTS: dict[str, Kind] = {
     ),
     "lifted": Kind("the wheels of a side leave the floor", LONG, _drawn_side, *_side(_lift, _put_down)),
     "coupling_broken": Kind("the coupling of a motor and its wheel breaks", LONG, wheel, _uncouple, stays),
+    "backlash": Kind(
+        "the gear of a motor has play", LONG, lambda r: {**wheel(r), "play_m": r.uniform(0.0005, 0.004)}, _loosen, stays
+    ),
     "pushed": Kind(
         "somebody pushes the base, with less than its friction", LONG,
         lambda r: {"share": r.choice((-1.0, 1.0)) * r.uniform(0.3, 0.9)}, _push, _let_go,

@@ -144,6 +144,25 @@ def _resume(world: World, around: Surroundings, given: Arguments) -> None:
         world.processes[name].go_on("suspend")
 
 
+def _disks(hang: bool) -> Change:
+    def change(world: World, around: Surroundings, given: Arguments) -> None:
+        for disk in (world.driver.disk, world.watchdog.disk, world.velocity.disk):
+            disk.file.hangs = hang
+
+    return change
+
+
+def _other_version(older: bool) -> Change:
+    """The velocity process is replaced, as by an upgrade of one part alone."""
+
+    def change(world: World, around: Surroundings, given: Arguments) -> None:
+        world.velocity.die()
+        world.lease_older = older
+        world.velocity.restart()
+
+    return change
+
+
 def _watchdog_deaf(world: World, around: Surroundings, given: Arguments) -> None:
     world.watchdog.fail_bus(True)
 
@@ -208,6 +227,15 @@ PROCESS_FAULTS: dict[str, Kind] = {
     "watchdog_bus_problem": Kind("the watchdog's adapter fails", SHORT, nothing, _watchdog_deaf, _watchdog_hears),
     "lease_lost": Kind(
         "leases get lost", LONG, lambda r: {"value": r.choice((0.3, 0.9, 1.0))}, *_leases("lease_loss", 0.0)
+    ),
+    "driver_thread_stalls": Kind(
+        "the thread of the driver's topics stands still, that of its bus does not", LONG, nothing,
+        *_driver("ros_stalls"),
+    ),
+    "disk_hangs": Kind("no write to the disk ends", LONG, nothing, _disks(True), _disks(False)),
+    "lease_of_older_version": Kind(
+        "the velocity process is replaced by an older version, whose leases differ", LONG, nothing,
+        _other_version(True), _other_version(False),
     ),
     "lease_garbage": Kind(
         "mangled leases come too", LONG, lambda r: {"value": True}, *_leases("lease_garbage", False)

@@ -26,6 +26,8 @@ from canbase_velocity.twist import Twist
 
 LEASE_DELAY_S = 0.0002
 BOOT_S = 10.0
+OLDER = b"CBL0"
+"""Magic of leases before the flags: four bytes shorter."""
 
 
 class World:
@@ -57,6 +59,8 @@ class World:
         """Since when somebody publishes on the lock that it holds."""
         self.lease_garbage = False
         """Every lease comes with a mangled copy of it."""
+        self.lease_older = False
+        """The velocity process is of an older version, whose leases have another layout."""
         self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
         self.topics = Topics(clock, self.random, pace.topic_jitter_s)
         self.drives = Drives(self.drawn, self.bus, pace, odd)
@@ -86,6 +90,9 @@ class World:
             self.topics.publish(source.topic, Twist(0.0, 0.0))
 
     def _lease(self, datagram: bytes, twist: Twist) -> None:
+        if self.lease_older:
+            self.clock.after(LEASE_DELAY_S, self.watchdog.on_lease, OLDER + datagram[len(OLDER) : -8] + datagram[-4:])
+            return
         if self.random.random() >= self.lease_loss:
             self.clock.after(LEASE_DELAY_S, self._deliver, datagram, twist)
         if self.lease_garbage:

@@ -31,6 +31,8 @@ class PlantParameters:
     """Yaw inertia = mass × this²."""
     wheel_mass_kg: float = 3.0
     """Rotor, gear and wheel inertia of one wheel, as mass at its rim."""
+    rotor_share: float = 0.5
+    """Of it the rotor has so much: what turns inside the play of a worn gear."""
     coulomb_n: float = 6.0
     """Dry friction of one wheel [N]."""
     viscous_nspm: float = 8.0
@@ -52,6 +54,8 @@ class PlantParameters:
             raise ValueError("masses, factor, gyration, force, bandwidth and step must be above 0 and finite")
         if not all(0.0 <= value < 1e6 for value in (self.coulomb_n, self.viscous_nspm)):
             raise ValueError("frictions must not be negative")
+        if not 0.0 < self.rotor_share < 1.0:
+            raise ValueError("rotor_share must be between 0 and 1")
         if not all(-1.0 < value < 1.0 for value in (self.slip_left, self.slip_right)):
             raise ValueError("slip must be between -1 and 1")
         if self.bandwidth_radps * self.step_s > 0.5:
@@ -87,6 +91,50 @@ class FreeRotor:
         self.speed_mps = speed
 
 
+class LooseRotor:
+    """A motor with play to its wheel: inside the play both move alone, at its ends they push each other.
+
+    A blow is inelastic: it makes both equally fast, and never more energy than there was. SI, at the rim, positive in
+    the motor's own positive direction.
+    """
+
+    def __init__(self, motor: Motor, direction: float, side: str, mass_kg: float, step_s: float, play_m: float) -> None:
+        self.motor, self.direction, self.side, self.mass_kg = motor, direction, side, mass_kg
+        self._h, self._half_m = step_s, play_m / 2.0
+        self.speed_mps, self.travel_m = motor.speed_mps, 0.0
+        self.ahead_m = 0.0
+        """Of its wheel, from the middle of the play."""
+        self._new_mps = self.speed_mps
+
+    def push(self) -> None:
+        """Its motor alone, for one inner step."""
+        self.motor.step(self.speed_mps)
+        self._new_mps = self.speed_mps + self.motor.settle_mps(self.motor.speed_mps, self.mass_kg)
+
+    def _touches(self, wheel_mps: float) -> bool:
+        """It moves, relative to a wheel that is so fast, beyond the end of the play."""
+        closing_m = (self._new_mps - wheel_mps) * self._h
+        ahead_m = self.ahead_m + closing_m
+        return ahead_m > self._half_m if closing_m > 0.0 else closing_m < 0.0 and ahead_m < -self._half_m
+
+    def blow(self, wheel_mps: float, inverse_kg: float) -> float:
+        """Impulse on a wheel that is so fast, and whose side has this inverse mass; both are equally fast then."""
+        if not self._touches(wheel_mps):
+            return 0.0
+        impulse = (self._new_mps - wheel_mps) / (1.0 / self.mass_kg + inverse_kg)
+        self._new_mps -= impulse / self.mass_kg
+        return impulse
+
+    def follow(self, wheel_mps: float, rolled_m: float) -> None:
+        """The end of the step: its wheel has rolled so far, and friction that holds the wheel holds it too."""
+        if self._touches(wheel_mps) and abs(wheel_mps) < abs(self._new_mps):
+            self._new_mps = wheel_mps
+        way_m = (self.speed_mps + self._new_mps) / 2.0 * self._h
+        self.travel_m += way_m
+        self.ahead_m += way_m - rolled_m
+        self.speed_mps = self._new_mps
+
+
 class Base:
     """The moving robot. All fields are ground truth: pose in the frame where it started, rim speeds, ways."""
 
@@ -109,6 +157,10 @@ class Base:
         self._parameters = parameters
         self.free_rotors: list[FreeRotor] = []
         """Motors that do not drive their wheels any more."""
+        self.loose_rotors: list[LooseRotor] = []
+        """Motors with play."""
+        self._wheels = {"left": len(left), "right": len(right)}
+        self._loose_kg = {"left": 0.0, "right": 0.0}
         self._lifted: set[str] = set()
         self._invert_mass_matrix(parameters)
         self.x_m = self.y_m = self.turned_rad = 0.0
@@ -185,6 +237,40 @@ class Base:
         self.free_rotors.append(FreeRotor(motor, p.wheel_mass_kg, p.coulomb_n / 4.0, self._h))
         return self.free_rotors[-1]
 
+    @property
+    def rotor_kg(self) -> float:
+        """Mass of one motor's rotor, as seen at the rim."""
+        return self._parameters.wheel_mass_kg * self._parameters.rotor_share
+
+    def loosen(self, motor: Motor, play_m: float) -> LooseRotor:
+        """The gear of this motor has so much play from now on, at the rim; its speed is that of its wheel."""
+        for name, side in (("left", self._left), ("right", self._right)):
+            for pair in [pair for pair in side if pair[0] is motor]:
+                side.remove(pair)
+                self._loose_kg[name] += self.rotor_kg
+                self.loose_rotors.append(LooseRotor(motor, pair[1], name, self.rotor_kg, self._h, play_m))
+        self._invert_mass_matrix(self._parameters)
+        return self.loose_rotors[-1]
+
+    def _knock(self, vl: float, vr: float) -> tuple[float, float]:
+        """The speeds of both sides after the blows of rotors at the ends of their play."""
+        for rotor in self.loose_rotors:
+            rotor.push()
+            left = rotor.side == "left"
+            inverse = self._inverse_left if left else self._inverse_right
+            impulse = rotor.direction * rotor.blow(rotor.direction * (vl if left else vr), inverse)
+            vl += (self._inverse_left if left else self._cross) * impulse
+            vr += (self._cross if left else self._inverse_right) * impulse
+        return vl, vr
+
+    def _follow(self, left_m: float, right_m: float) -> None:
+        """The rotors with play, after the sides have rolled since these travels."""
+        for rotor in self.loose_rotors:
+            speed, rolled = self.v_left_mps, self.travel_left_m - left_m
+            if rotor.side == "right":
+                speed, rolled = self.v_right_mps, self.travel_right_m - right_m
+            rotor.follow(rotor.direction * speed, rotor.direction * rolled)
+
     def step(self, now_s: float) -> None:
         """Advance by one inner step that ends at `now_s`."""
         vl, vr, h = self.v_left_mps, self.v_right_mps, self._h
@@ -199,7 +285,12 @@ class Base:
         a, b, c = self._inverse_left, self._inverse_right, self._cross
         new_left = vl + (a * push_left + c * push_right) * h
         new_right = vr + (c * push_left + b * push_right) * h
-        self._move(*self._rub(new_left, new_right), now_s)
+        if not self.loose_rotors:
+            self._move(*self._rub(new_left, new_right), now_s)
+            return
+        left_m, right_m = self.travel_left_m, self.travel_right_m
+        self._move(*self._rub(*self._knock(new_left, new_right)), now_s)
+        self._follow(left_m, right_m)
 
     def _rub(self, vl: float, vr: float) -> tuple[float, float]:
         """The speeds after Coulomb friction. While both sides slide on, both impulses are at their bounds."""
@@ -239,6 +330,7 @@ class Base:
         self.travel_m += way
         self.path_m += abs(way)
         self.resting = vl == 0.0 == vr and left == 0.0 == right and not self.push_n and not self.free_rotors
+        self.resting = self.resting and not self.loose_rotors
         self.v_left_mps, self.v_right_mps = vl, vr
         if abs(vl) > self._standstill or abs(vr) > self._standstill:
             self.time_of_motion = now_s
@@ -247,8 +339,8 @@ class Base:
         """Kinetic energy = ½ (vl, vr) A (vl, vr)ᵀ; kept is the inverse of A."""
         body = p.mass_kg * p.payload_factor
         turning = body * p.yaw_gyration_m**2 / self._track**2
-        left = body / 4.0 + turning + p.wheel_mass_kg * len(self._left)
-        right = body / 4.0 + turning + p.wheel_mass_kg * len(self._right)
+        left = body / 4.0 + turning + p.wheel_mass_kg * self._wheels["left"] - self._loose_kg["left"]
+        right = body / 4.0 + turning + p.wheel_mass_kg * self._wheels["right"] - self._loose_kg["right"]
         cross = body / 4.0 - turning
         determinant = left * right - cross * cross
         self._inverse_left, self._inverse_right = right / determinant, left / determinant

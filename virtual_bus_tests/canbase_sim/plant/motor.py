@@ -6,6 +6,7 @@ Speeds in m/s and forces in N at the rim, positive in the motor's own positive d
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import exp
 
 AT_ONCE = float("inf")
 """Slope of a demand that jumps: mode 9, and stopping at the torque limit."""
@@ -70,6 +71,18 @@ class Motor:
         if self.sensor is not None:
             return False
         return not self.powered or (self.demand_mps == 0.0 == self.goal_mps and not self._stopping)
+
+    def settle_mps(self, speed_mps: float, mass_kg: float) -> float:
+        """By how much the velocity loop changes the speed of a mass in one inner step, after `step` [m/s].
+
+        Of a mass that is much lighter than the loop was tuned for it is exact, where force × time would overshoot.
+        """
+        change_mps = self.force_n / mass_kg * self._dt
+        if not self.powered:
+            return 0.0
+        wanted_mps = self.demand_mps + self._integral / self._kp - speed_mps
+        most_mps = wanted_mps * (1.0 - exp(-self._kp * self._dt / mass_kg))
+        return most_mps if abs(change_mps) > abs(most_mps) else change_mps
 
     def step(self, speed_mps: float) -> float:
         """One inner step at this true speed, of which the loop knows what is measured; returns the force at the rim."""
