@@ -21,8 +21,8 @@ MOST_ENTRIES: Final = 500_000
 """More files than any environment has: half a minute on a slow disk. Beyond it the answer is no."""
 MOST_LINKS: Final = 40
 """In one path, as the kernel has it."""
-ACL: Final = "system.posix_acl_"
-"""Extended attributes: the list of a file, and the default one of a folder (acl(5))."""
+ACLS: Final = ("system.posix_acl_", "system.nfs4_acl")
+"""Extended attributes: lists of a file and default ones of a folder (acl(5)), and lists of NFSv4, CIFS and ZFS."""
 TOLD: Final = 3
 """So many faults are named; the cure of one is often that of all."""
 
@@ -66,9 +66,9 @@ def fault(found: os.stat_result, *, above: bool, trusted: frozenset[int] = ROOT_
 
 
 def has_acl(path: str) -> bool:
-    """Whether it has a POSIX ACL, or passes one on to new files; a mode shows no more than its mask. Raises OSError."""
+    """Whether it has an ACL, or passes one on to new files; a mode shows no more than its mask. Raises OSError."""
     try:
-        return any(name.startswith(ACL) for name in os.listxattr(path, follow_symlinks=False))
+        return any(name.startswith(ACLS) for name in os.listxattr(path, follow_symlinks=False))
     except OSError as error:
         if error.errno in (errno.ENOTSUP, errno.ENOENT):  # a file system without any; gone meanwhile
             return False

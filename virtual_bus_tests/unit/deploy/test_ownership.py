@@ -117,6 +117,15 @@ def test_an_access_control_list_that_cannot_be_read_is_a_fault_and_none_where_th
     assert mine(tree)[0].why == "cannot be looked at: Permission denied"
 
 
+@pytest.mark.parametrize("name", ["system.nfs4_acl", "system.nfs4_acl_xdr", "system.posix_acl_default"])
+def test_an_access_control_list_of_nfs_is_one(tree: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """A mode shows nothing of it, and setfacl(1) does not remove it."""
+    monkeypatch.setattr(os, "listxattr", lambda *_, **__: ["user.mime_type", name])
+    assert mine(tree)[0].why == "has an access control list"
+    monkeypatch.setattr(os, "listxattr", lambda *_, **__: ["user.mime_type"])
+    assert mine(tree) == []
+
+
 def test_a_tree_of_a_user_is_told_once_with_its_cure(tree: Path) -> None:
     """As `chown $USER` leaves it: from the first folder on that is not root's."""
     told = faults([str(tree)], frozenset((54321,)))
