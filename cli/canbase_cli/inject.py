@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -68,6 +67,7 @@ def inject(
 
 
 def _signal(robot: Robot, part: str, fault: str) -> None:
+    from canbase_runtime.own_process import NotOursError, send_signal
     from canbase_runtime.single_instance import bus_name, holder
 
     if fault not in SIGNALS:
@@ -78,7 +78,9 @@ def _signal(robot: Robot, part: str, fault: str) -> None:
     if pid is None:
         fail(f"{part} of {robot.name} does not run; start it with `canbase up`", FAILED)
     try:
-        os.kill(pid, SIGNALS[fault])
+        send_signal(pid, SIGNALS[fault])
+    except NotOursError as error:
+        fail(f"{part} of {robot.name} gets no signal: {error}", FAILED)
     except OSError as error:
         fail(f"{part} is process {pid}: {error.strerror}", FAILED)
 

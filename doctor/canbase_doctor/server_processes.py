@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import pwd
 from collections.abc import Iterator
 from pathlib import Path
 
 from canbase_doctor.evidence import ServerProcess
+from canbase_runtime.own_process import refusal
 
 PROC = Path("/proc")
 DECIDES = ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION")
 
 
 def server_processes(proc: Path = PROC) -> tuple[ServerProcess, ...]:
-    """Those that this user may look at; doctor itself is none."""
+    """Those of this user and of the services; a stranger's process is none, whatever it is called."""
     return tuple(ServerProcess(pid, talks_by(pid, proc)) for pid in sorted(_pids(proc)))
 
 
@@ -33,8 +36,16 @@ def _pids(proc: Path) -> Iterator[int]:
             words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
         except OSError:  # it ended meanwhile
             continue
-        if int(folder.name) != os.getpid() and _is_server(words):
+        if int(folder.name) != os.getpid() and _is_server(words) and not refusal(int(folder.name), _users(), proc):
             yield int(folder.name)
+
+
+def _users() -> set[int]:
+    """Who starts canbase here: this user, and the services' user."""
+    users = {os.geteuid()}
+    with contextlib.suppress(KeyError):
+        users.add(pwd.getpwnam("canbase").pw_uid)
+    return users
 
 
 def _is_server(words: list[str]) -> bool:

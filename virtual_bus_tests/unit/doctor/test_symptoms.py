@@ -308,6 +308,7 @@ def process(proc: Path, pid: int, words: list[str], environment: Mapping[str, st
     """A process as /proc shows it."""
     folder = proc / str(pid)
     folder.mkdir()
+    (folder / "exe").symlink_to("/usr/bin/python3" if words[0] != "bash" else "/usr/bin/bash")
     (folder / "cmdline").write_bytes("\0".join(words).encode() + b"\0")
     (folder / "environ").write_bytes("\0".join(f"{name}={value}" for name, value in environment.items()).encode())
 
@@ -320,6 +321,7 @@ def test_servers_are_found_among_all_processes_with_what_decides_whom_they_talk_
     process(tmp_path, 13, ["less", "action-server"], domain)
     (tmp_path / "14").mkdir()  # it ended between two looks
     process(tmp_path, 15, ["/usr/bin/python3", "/opt/ws/lib/canbase/drive_distance_server", "--config", "a"], {})
+    process(tmp_path, 16, ["bash", "/usr/bin/canbase", "action-server"], domain)  # called as if it were one
     found = (ServerProcess(10, {"ROS_DOMAIN_ID": "5"}), ServerProcess(11, {}), ServerProcess(15, {}))
     assert server_processes(tmp_path) == found
     assert talks_by(99, tmp_path) == {}
