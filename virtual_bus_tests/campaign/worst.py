@@ -1,7 +1,7 @@
 """`python -m campaign.worst`: the worst speed, turn, load and moment of each failure, searched for in virtual time.
 
 docs/stop_times.md has each failure at one speed. The worst case of a failure often lies just below a threshold of what
-detects it, at a speed that no table has. A coarse grid over all speeds and turns, then a compass search from its worst.
+detects it, at a speed that no table has. A coarse grid over all speeds, turns and loads, then CMA-ES from its worst.
 Exit code 1: a base did not stop.
 """
 
@@ -11,7 +11,8 @@ import argparse
 import math
 import multiprocessing
 import sys
-from collections.abc import Callable, Iterable, Iterator
+import warnings
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -22,9 +23,14 @@ from rich.console import Console
 from canbase_campaign.cruise import Cruise, Run
 from canbase_campaign.robots import DrawnRobot, campaign_robot
 from canbase_campaign.twins import JOYSTICK, TWINS, Twin
+from canbase_config.robot import Robot
 from canbase_config.stopping import max_wheel_mps
 from canbase_sim.plant.base import PlantParameters
 from support.marked_page import rewritten
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # that it cannot plot
+    import cma  # type: ignore[import-untyped]
 
 COMMAND: Final = "make worst"
 SEARCHED: Final = (
@@ -35,12 +41,22 @@ SEARCHED: Final = (
 """The failures that are searched, by the begin of their name: those whose time depends on a threshold of speed."""
 LINEAR, TURN, LOADS = (0.0, 0.15, 0.3, 0.6, 1.0), (-1.0, -0.5, 0.0, 0.5, 1.0), (1.0, 2.0)
 """The grid: shares of both limits, and multiples of the mass of the empty robot."""
-STEP, LEAST_STEP = 0.125, 1.0 / 64.0
-"""Of the compass search, in shares of the limits."""
+SIGMA, LEAST_STEP = 0.08, 1.0 / 64.0
+"""Of the search, in shares of the limits: how far it looks at first, and how finely."""
+OPTIONS: Final = {
+    "bounds": [[0.0, -1.0, 0.0], [1.0, 1.0, 1.0]], "maxfevals": 160, "popsize": 10, "seed": 127, "verbose": -9,
+    "tolx": LEAST_STEP / 4.0, "tolflatfitness": 6,
+}  # fmt: skip
+"""Of cma: within the limits, and the same each time."""
 STARTS = 2
 """One hill of several need not be the highest."""
 SEEDS = 2
 """Moments and wheels of each point."""
+
+
+@cache
+def _robot() -> Robot:
+    return campaign_robot()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +70,7 @@ class Point:
     @property
     def is_possible(self) -> bool:
         """Within the limits, moving, and no wheel faster than the driver lets it be."""
-        robot = campaign_robot()
+        robot = _robot()
         if not (0.0 <= self.linear <= 1.0 and -1.0 <= self.turn <= 1.0 and (self.linear or self.turn)):
             return False
         return self.wheel_mps <= max_wheel_mps(robot) * (1.0 + 1e-9)
@@ -62,12 +78,12 @@ class Point:
     @property
     def wheel_mps(self) -> float:
         """Of the faster wheel's rim."""
-        robot = campaign_robot()
+        robot = _robot()
         turning_mps = abs(self.turn) * robot.limits.angular_radps * robot.base.track_m / 2.0
         return self.linear * robot.limits.linear_mps + turning_mps
 
     def __str__(self) -> str:
-        limits = campaign_robot().limits
+        limits = _robot().limits
         load = "" if self.load == 1.0 else f", load {self.load:g} ×"
         return f"{self.linear * limits.linear_mps:.2f} m/s, {self.turn * limits.angular_radps:+.2f} rad/s{load}"
 
@@ -87,31 +103,38 @@ def grid() -> list[Point]:
 
 
 def worst(value: Callable[[Point], float], start: Iterable[Point]) -> Found:
-    """The greatest `value` that a compass search finds, from each of the STARTS worst points of `start`."""
+    """The greatest `value` that CMA-ES finds from each of the STARTS worst points of `start`; the same each time.
+
+    An evolution strategy takes cliffs as they come: the worst case of a failure often lies just below one.
+    """
     ordered = sorted((Found(value(point), point) for point in start), key=lambda found: found.value, reverse=True)
-    return max((_climbed(value, found) for found in ordered[:STARTS]), key=lambda found: found.value)
+    return max((_evolved(value, found) for found in ordered[:STARTS]), key=lambda found: found.value)
 
 
-def _climbed(value: Callable[[Point], float], best: Found) -> Found:
-    step = STEP
-    while step >= LEAST_STEP:
-        near = max((Found(value(point), point) for point in _around(best.point, step)), key=lambda found: found.value)
-        if near.value > best.value:
-            best = near
-        else:
-            step /= 2.0
+def _evolved(value: Callable[[Point], float], best: Found) -> Found:
+    at = [best.point.linear, best.point.turn, (best.point.load - LOADS[0]) / (LOADS[-1] - LOADS[0])]
+    search = cma.CMAEvolutionStrategy(at, SIGMA, OPTIONS)
+    while not search.stop():
+        drawn = search.ask()
+        found = [_valued(value, *each) for each in drawn]
+        search.tell(drawn, [-each.value for each in found])
+        best = max(best, *found, key=lambda each: each.value)
     return best
 
 
-def _around(point: Point, step: float) -> Iterator[Point]:
-    for linear, turn in ((step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)):
-        other = replace(point, linear=point.linear + linear, turn=point.turn + turn)
-        yield other if other.is_possible else point
+def _valued(value: Callable[[Point], float], linear: float, turn: float, load: float) -> Found:
+    """Of a point that the robot may drive, rounded as the page prints it; of any other one the least that there is."""
+    point = Point(_rounded(linear), _rounded(turn), LOADS[0] + _rounded(load, 0.25) * (LOADS[-1] - LOADS[0]))
+    return Found(value(point) if point.is_possible else 0.0, point)
+
+
+def _rounded(share: float, step: float = LEAST_STEP) -> float:
+    return round(share / step) * step
 
 
 @cache
 def _cruise(point: Point) -> Cruise:
-    robot = campaign_robot()
+    robot = _robot()
     drawn = DrawnRobot(0, robot, PlantParameters(payload_factor=point.load))
     limits = robot.limits
     return Cruise(JOYSTICK, point.linear * limits.linear_mps, drawn, point.turn * limits.angular_radps)
