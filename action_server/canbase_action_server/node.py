@@ -45,6 +45,7 @@ from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_runtime.chain_topics import CHAIN, Use
 from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.log_budget import LogBudget
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.message_reader import MessageReader
 from canbase_runtime.receive_time import REQUEST_GAP_S, RESENT_S, ReceiveTimes
@@ -65,6 +66,9 @@ CANCEL_GOALS = "drive_distance_server/cancel_goals"
 """The service that cancels goals of all actions of this server."""
 NOT_CANCELED = CancelGoal.Response(return_code=CancelGoal.Response.ERROR_REJECTED)
 
+OF_REQUESTS = (GoalStep.REJECTED, GoalStep.CANCEL_REQUESTED)
+"""Steps that any client causes as often as it likes: their lines have a budget."""
+
 T = TypeVar("T")
 
 
@@ -78,6 +82,7 @@ class DriveDistanceServer(Node):
         self._own_source = action_source(robot)
         self._goal_queue = GoalQueue(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
+        self._budgets = {step: LogBudget() for step in OF_REQUESTS}
         self._inputs = Inputs()
         self._states = {self.resolve_topic_name(row.topic): row for row in CHAIN if row.use is Use.STATE}
         self._reader = MessageReader()
@@ -286,6 +291,12 @@ class DriveDistanceServer(Node):
         self._orders.publish(self._serialized.pack(twist.linear_mps, twist.angular_radps, stamp))
 
     def _log(self, step: GoalStep, uuid: str | None, **fields: Any) -> None:
+        budget = self._budgets.get(step)
+        omitted = budget.take(time.monotonic()) if budget else 0
+        if omitted is None:
+            return
+        if omitted:
+            fields["omitted_lines"] = omitted
         self._write_log(step, uuid, fields, Priority.INFO)
 
     def _write_log(self, step: GoalStep, uuid: str | None, fields: dict[str, Any], priority: Priority) -> None:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import os
 import socket
+import time
 from collections.abc import Mapping
 from typing import Final, Protocol
 
 from canbase_runtime.foreign_text import LINE_LENGTH, printable
+from canbase_runtime.log_budget import LogBudget
 from canbase_runtime.log_priority import Priority
 
 SOCKET: Final = "/run/systemd/journal/socket"
@@ -59,14 +61,25 @@ class Logger(Protocol):
         """A line of severity INFO."""
 
 
+VOICE_BURST, VOICE_PER_S = 200.0, 20.0
+"""Lines of one part, far more than any operation writes."""
+
+
 class Voice:
     """The log of one part: each sentence is a line of ROS's log and a journal entry with priority and fields."""
 
     def __init__(self, logger: Logger, journal: Journal) -> None:
         self._logger, self._journal = logger, journal
+        self._budget = LogBudget(VOICE_BURST, VOICE_PER_S)
 
     def tell(self, sentence: str, priority: Priority, **fields: object) -> None:
-        """One sentence, which is one line whatever is in it. ROS knows no notice: it is an INFO there."""
+        """One sentence, which is one line whatever is in it. ROS knows no notice: it is an INFO there. A flood of them
+        (a lock that is set and released by each message) is cut off, and counted; an error is always written."""
+        omitted = 0 if priority is Priority.ERROR else self._budget.take(time.monotonic())
+        if omitted is None:
+            return
+        if omitted:
+            self._logger.warning(f"{omitted} lines omitted: more than {VOICE_PER_S:g} each second")
         sentence = printable(sentence, LINE_LENGTH)
         self._journal.tell(sentence, priority, **fields)
         if priority is Priority.ERROR:  # a call for each severity: rclpy holds a line of source to one

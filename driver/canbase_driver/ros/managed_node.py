@@ -87,6 +87,8 @@ class ManagedNode(LifecycleNode):
         asked.answer()
 
     def _refuse(self, asked: Asked, why: str) -> None:
-        self.get_logger().warning(f"lifecycle: transition {asked.request.transition.id} {why}")
+        self.get_logger().warning(
+            f"lifecycle: transition {asked.request.transition.id} {why}", throttle_duration_sec=1.0
+        )
         asked.response.success = False
         asked.answer()

@@ -21,6 +21,7 @@ from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_runtime.foreign_text import printable
 from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.log_budget import LogBudget
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
 
@@ -38,6 +39,7 @@ class DriverServices:
         self._node = node
         self._odom_frame = odom_frame
         self._request_times = request_times
+        self._budget = LogBudget()
         self._voice = Voice(node.get_logger(), Journal("motor_driver"))
         answer_later(node.create_service(Trigger, "motor_driver/stop", _answered_later), self._on_stop)
         self._offer("motor_driver/reset", self._on_reset)
@@ -80,13 +82,20 @@ class DriverServices:
     def _on_set_pose(self, message: PoseWithCovarianceStamped) -> None:
         if self._request_times.waited(time.monotonic()):
             self._node.get_logger().warning(
-                "set_pose refused: it may be old, because motor_driver did not run before it"
+                "set_pose refused: it may be old, because motor_driver did not run before it", throttle_duration_sec=1.0
             )
         elif message.header.frame_id != self._odom_frame:
             frame = printable(message.header.frame_id)
-            self._node.get_logger().warning(f"set_pose refused: frame_id is {frame!r}, not {self._odom_frame!r}")
+            why = f"set_pose refused: frame_id is {frame!r}, not {self._odom_frame!r}"
+            self._node.get_logger().warning(why, throttle_duration_sec=1.0)
         else:
-            self._loop.set_pose(pose_of(message.pose.pose), self._tell)
+            self._loop.set_pose(pose_of(message.pose.pose), self._tell_pose)
+
+    def _tell_pose(self, outcome: Outcome) -> None:
+        """A topic, which may be flooded."""
+        self._node.get_logger().info(outcome.sentence, throttle_duration_sec=1.0)
 
     def _tell(self, outcome: Outcome) -> None:
-        self._node.get_logger().info(outcome.sentence)
+        omitted = self._budget.take(time.monotonic())
+        if omitted is not None:
+            self._node.get_logger().info(outcome.sentence + (f" ({omitted} lines omitted)" if omitted else ""))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import VOICE_BURST, VOICE_PER_S, Journal, Voice
 from canbase_runtime.log_priority import Priority
 from canbase_watchdog.log import formatter
 
@@ -88,6 +88,21 @@ def test_a_voice_is_heard_in_the_log_of_ros_and_in_the_journal(
     entry = listener.recv(1000).decode().splitlines()
     assert entry[:2] == ["MESSAGE=nav drives", f"PRIORITY={int(priority)}"]
     assert entry[3:] == ["CANBASE_PART=velocity_mux", "CANBASE_ACTIVE=nav"]
+
+
+def test_a_flood_of_lines_is_cut_off_and_errors_are_not(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 5.0
+    monkeypatch.setattr("canbase_runtime.journal.time.monotonic", lambda: now_s)
+    logger = HeardLogger()
+    voice = Voice(logger, Journal("velocity_mux", {}, path))
+    for _ in range(10_000):
+        voice.tell("lock pause is set", Priority.NOTICE)
+    assert len(logger.lines) == VOICE_BURST
+    voice.tell("defect", Priority.ERROR)
+    assert logger.lines[-1] == ("ERROR", "defect")
+    now_s += 1.5 / VOICE_PER_S
+    voice.tell("nav drives", Priority.INFO)
+    assert logger.lines[-2:] == [("WARN", "9800 lines omitted: more than 20 each second"), ("INFO", "nav drives")]
 
 
 @pytest.mark.parametrize(
