@@ -35,7 +35,9 @@ _DRIVER_GONE = ("driver_dies", "driver_hangs")
 _WATCHDOG_GONE = ("watchdog_dies", "watchdog_hangs")
 _VELOCITY_GONE = ("velocity_dies", "velocity_hangs")
 _HELD = ("stick_held", "drive_fault", "resets_too_early")
-_LIES = ("encoder_frozen", "frozen_encoder", "stuck_velocity", "encoder_jumping", "encoder_intermittent")
+_LIES = (
+    "encoder_frozen", "encoder_ghost", "frozen_encoder", "stuck_velocity", "encoder_jumping", "encoder_intermittent"
+)  # fmt: skip
 _OFF = ("drive_sto", "drive_fault")
 _DRIVER_SEES = "driver:drive_fault+driver:drive_restarted+driver:drive_silent+driver:drive_disabled"
 _DRIVER_HEEDS = "power:command_not_zero+driver:reset_needs_zero+driver:zero_before_motion"

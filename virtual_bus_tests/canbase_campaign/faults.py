@@ -72,6 +72,7 @@ ADDED_LATER = (
     "driver_crashes",
     "driver_thread_stalls",
     "enables_slowly",
+    "encoder_ghost",
     "lease_of_older_version",
     "leaves_operational",
     "lifted",

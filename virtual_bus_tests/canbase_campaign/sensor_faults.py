@@ -61,6 +61,12 @@ SENSOR_FAULTS: dict[str, Kind] = {
         wheel,
         *bench.suffer("encoder_frozen", bench.heal_encoder),
     ),
+    "encoder_ghost": Kind(
+        "an encoder counts nothing and shows a small residue",
+        LONG,
+        lambda r: {**wheel(r), "residue_mps": r.choice((-1.0, 1.0)) * r.choice((0.0001, 0.0005, 0.003, 0.01, 0.04))},
+        *bench.suffer("encoder_ghost", bench.heal_encoder),
+    ),
     "encoder_reversed": Kind(
         "an encoder counts backward", LONG, wheel, *bench.suffer("encoder_reversed", bench.heal_encoder),
     ),

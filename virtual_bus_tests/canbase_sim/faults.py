@@ -157,6 +157,7 @@ KINDS: Mapping[str, tuple[Callable[..., None], frozenset[str]]] = {
     "unbraked": (_unbraked, frozenset({"axis", "share"})),
     "encoder_lost": (_encoder(), frozenset({"axis"})),
     "encoder_frozen": (_encoder(holds_speed=True), frozenset({"axis"})),
+    "encoder_ghost": (_encoder(holds_speed=True, residue_mps=0.003), frozenset({"axis", "residue_mps"})),
     "encoder_zero": (_encoder_zero, frozenset({"axis"})),
     "encoder_jumping": (_encoder(factor=1.0, jump_m=0.01, every_s=0.02), frozenset({"axis", "jump_m", "every_s"})),
     "encoder_scaled": (_encoder(factor=0.5), frozenset({"axis", "factor"})),
@@ -182,8 +183,9 @@ blocked: something holds its wheel, with `force_n` beyond its friction, by defau
 motor gets a share of each setpoint, half by default. unbraked: it reports its stops (quick stop, fault reaction) and
 brakes with a share of their slopes, none by default.
 encoder_…: all that hangs on one encoder, 6064h, 606Ch and the drive's own loops. lost: it counts nothing and shows no
-speed. frozen: it counts nothing and shows its last speed. zero: lost, and 6064h is 0. jumping: `jump_m` ahead and back
-in turn, each `every_s`. scaled: it counts `factor` times the motion, 0.5 by default. reversed: it counts backward.
+speed. frozen: it counts nothing and shows its last speed. ghost: it counts nothing and shows `residue_mps`, 3 mm/s by
+default. zero: lost, and 6064h is 0. jumping: `jump_m` ahead and back in turn, each `every_s`.
+scaled: it counts `factor` times the motion, 0.5 by default. reversed: it counts backward.
 intermittent: nothing for `off_s`, everything for `on_s` (0: as long), in turn.
 rpdo_lost: setpoints of one axis do not reach it, or every n-th does. tpdo_lost: the feedback PDOs of one axis are lost.
 mute_boot: its boot-up messages are lost. short_emcy: three bytes. aliases: 29-bit frames that look like its own.
@@ -201,6 +203,7 @@ RANGES: Mapping[str, tuple[type, float, float]] = {
     "share": (float, 0.0, 1.0),
     "factor": (float, -10.0, 10.0),
     "force_n": (float, 0.0, 1e9),
+    "residue_mps": (float, -10.0, 10.0),
     "jump_m": (float, 0.0, 10.0),
     "every_s": (float, 0.002, 10.0),
     "every": (int, 0, 100),

@@ -21,9 +21,9 @@ HOT = {
     "canbase_config": "watchdog",
     "canbase_runtime": "driver_state latch_record source_standing stop_cause watchdog_view",
     "canbase_watchdog": (
-        "bus_health copies counts creep envelope frames guarding halt ladder latch lease motion_evidence observer "
-        "overshoot pair plausibility policy power_and_motion second_master slowing standing stopper stopping_distance "
-        "tally torque trip_cause twist view watchdog"
+        "bus_health copies counts creep envelope frames ghost guarding halt ladder latch lease motion_evidence "
+        "observer overshoot pair plausibility policy power_and_motion second_master slowing standing stopper "
+        "stopping_distance tally torque trip_cause twist unasked_torque view watchdog"
     ),
     "canbase_driver": (
         "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "

@@ -17,8 +17,7 @@ that is being stopped can lose its sensor as well (docs/decisions/0020)
 2. Halted: the velocity of a wheel that rolled drops at once to standstill, as no wheel can, whatever is ordered, and
    the encoder does not move from then on.
 3. Jolts: velocities that change as no wheel can, again and again.
-4. Ghost: the velocity shows that the wheel turns, one way, and the encoder does not move. Its drive pushes against a
-   motion that there is not, also with nothing ordered and after it has released the wheel.
+4. Ghost: the velocity shows that the wheel turns, one way, and the encoder does not move (ghost.py).
 5. Behind: slower than the least that the setpoints of the last `drive_lag_s` order, reached by `slowest_ramp_mps2`.
    It adds up while the wheel is too slow, and goes down as fast while it is not.
 6. Strained: its drive gives all its torque, and the wheel is slower than ordered and gets no faster: an encoder that
@@ -34,6 +33,7 @@ from dataclasses import dataclass, replace
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import Life, life_m
 from canbase_watchdog.envelope import Peak
+from canbase_watchdog.ghost import NO_GHOST, Ghost, GhostWatch
 
 UNSEEN_COUNTS = 4
 """With a coarse encoder nothing is missed before this many increments were ordered."""
@@ -54,12 +54,6 @@ BOTH_WAYS = 2.0
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of the travel by velocity: the wheel really rolled."""
 JOLT_MEMORY_S = 1.0
-GHOST_LIVES = 2.0
-"""This many signs of life the velocity may show that the encoder does not show, ..."""
-GHOST_BITS, GHOST_FALLS = 4.0, 0.99
-"""A register that shows a few bits at standstill is none, nor is a filter's tail: only a velocity that stays counts."""
-GHOST_LAG_S = 0.1
-"""... apart from this time after the last one: 606Ch may be filtered, and a wheel may meet something hard."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +74,8 @@ class Evidence:
     """Samples in a row without any motion after a drop that no wheel can do: rule 2."""
     jolts: int = 0
     """Changes of the velocity that no wheel can do, none more than JOLT_MEMORY_S after the one before: rule 3."""
-    ghost_m: float = 0.0
-    """Travel by the velocity alone: rule 4."""
-    ghost: bool = False
-    """It is beyond what is allowed."""
+    ghost: Ghost = NO_GHOST
+    """Rule 4."""
     behind_s: float = 0.0
     """Rule 5."""
     strained_s: float = 0.0
@@ -102,7 +94,7 @@ class EvidenceWatch:
         self._life_m = life_m(drive, config)
         self._life = Life(self._life_m)
         self._slack_mps = config.motion_tolerance_mps + abs(drive.velocity_mps_per_bit)
-        self._residue_mps = GHOST_BITS * abs(drive.velocity_mps_per_bit)
+        self._ghost = GhostWatch(drive, config, now_s)
         self._period_s = 1.0 / config.control_hz
         self._backward, self._forward = Peak(config.drive_lag_s), Peak(config.drive_lag_s)
         self._setpoint_mps = self._ordered_mps = 0.0
@@ -114,7 +106,6 @@ class EvidenceWatch:
         self._rolled = self._rests = False
         self._turns = 0
         self._jolted_at = -math.inf
-        self._lived_at, self._ghost_s = now_s, 0.0
         self.last = Evidence()
 
     def on_sync(self, rests: bool) -> None:
@@ -130,7 +121,7 @@ class EvidenceWatch:
     def trust(self) -> None:
         """A reset was accepted: everything starts again."""
         self._life.begin()
-        self._ghost_s = 0.0
+        self._ghost.trust()
         self.last = Evidence()
 
     def doubt(self) -> None:
@@ -153,23 +144,19 @@ class EvidenceWatch:
         """
         jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
         lives = self._lives(step_m, jolted)
-        falls = abs(velocity_mps) < GHOST_FALLS * abs(self._velocity_mps)
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
         self._ask(elapsed_s, now_s, enabled)
-        ghost_m = self._ghost_m(
-            lives or step_m is None, velocity_mps, elapsed_s if powered and not falls else 0.0, now_s
-        )
+        ghost = self._ghost.on_sample(velocity_mps, step_m, powered, elapsed_s, now_s)
         strained_s = self._strained_s(velocity_mps, torque if powered and enabled else None, elapsed_s, now_s)
         if not powered:
-            self.last = self._kept(lives, ghost_m)
+            self.last = self._kept(lives, ghost)
             return
-        before = self._unseen(lives, step_m is not None, elapsed_s, torque) if enabled else self._kept(lives, ghost_m)
+        before = self._unseen(lives, step_m is not None, elapsed_s, torque) if enabled else self._kept(lives, ghost)
         halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now_s)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
         strained = strained_s >= self._config.motion_missing_s
-        ghost = abs(ghost_m) >= GHOST_LIVES * self._life_m and self._ghost_s >= GHOST_LAG_S
-        lies = unseen or ghost or strained or halted >= samples or jolts >= self._config.jolts
+        lies = unseen or ghost.is_one or strained or halted >= samples or jolts >= self._config.jolts
         self.last = Evidence(
             self._ordered_mps,
             self._setpoint_mps,
@@ -180,7 +167,6 @@ class EvidenceWatch:
             unseen,
             halted,
             jolts,
-            ghost_m,
             ghost,
             self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
             strained_s,
@@ -249,7 +235,7 @@ class EvidenceWatch:
             return LEAST_WEIGHT if begins else 1.0
         return 1.0 if abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
-    def _kept(self, lives: bool, ghost_m: float) -> Evidence:
+    def _kept(self, lives: bool, ghost: Ghost) -> Evidence:
         """What outlives a time without power: most of it, or a drive that releases after each order is never found."""
         last = Evidence(trusted=self.last.trusted) if lives else self.last
         return Evidence(
@@ -257,7 +243,7 @@ class EvidenceWatch:
             both_s=min(last.both_s, KEPT_SHARE * self._config.motion_missing_s),
             both_m=min(last.both_m, BOTH_WAYS * self._unseen_m),
             jolts=self.last.jolts,
-            ghost_m=ghost_m,
+            ghost=replace(ghost, is_one=False),
             trusted=last.trusted,
         )
 
@@ -267,20 +253,6 @@ class EvidenceWatch:
         if halts:
             return 1
         return self.last.halted + 1 if self.last.halted and not lives else 0
-
-    def _ghost_m(self, lives: bool, velocity_mps: float, elapsed_s: float, now_s: float) -> float:
-        """Noise changes its sign, and one bad sample is over soon. What counted with power outlives a time without."""
-        if lives:
-            self._lived_at = now_s
-        if (
-            now_s < self._lived_at + GHOST_LAG_S
-            or velocity_mps * self.last.ghost_m < 0.0
-            or abs(velocity_mps) <= self._residue_mps
-        ):
-            self._ghost_s = 0.0
-            return 0.0
-        self._ghost_s += elapsed_s
-        return self.last.ghost_m + velocity_mps * elapsed_s
 
     def _jolts(self, jolted: bool, now_s: float) -> int:
         before = self.last.jolts if now_s < self._jolted_at + JOLT_MEMORY_S else 0

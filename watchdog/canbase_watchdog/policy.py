@@ -206,11 +206,12 @@ def _jolts(axis: Axis, config: WatchdogConfig) -> str:
 
 
 def _ghost(axis: Axis, config: WatchdogConfig) -> str:
-    if not axis.evidence.ghost:
+    ghost = axis.evidence.ghost
+    if not ghost.is_one:
         return ""
     return (
-        f"reports {axis.velocity_mps:.3f} m/s, {axis.evidence.ghost_m:.3f} m in all, and its encoder does not move: "
-        "its drive pushes against a motion that there is not; see encoder"
+        f"reports {axis.velocity_mps:.4f} m/s, {ghost.travel_m:.4f} m in all, and its encoder does not move: its drive "
+        "pushes against a motion that does not exist; see encoder"
     )
 
 

@@ -11,6 +11,8 @@ Rules, for a drive with power
    what held the wheel before motion was ordered (a hill), and more than there, whatever its direction; and nothing
    moves. Its time adds up over orders until the encoder moves, and most of it outlives the power. Of the first
    millimetres that it is ordered in one go it is time at rated torque, or longer at less: a wheel breaks loose slowly.
+3. Unasked: the torque changes with nothing ordered and without a count of the encoder. The drive must release the
+   wheel once more (unasked_torque.py).
 A drive that does not report its torque may give the rated one: rule 1 alone. So may one that has only ever reported
 zero.
 """
@@ -23,6 +25,7 @@ from dataclasses import dataclass, replace
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog.counts import Life, difference, life_m
 from canbase_watchdog.motion_evidence import KEPT_SHARE, STRAIN_SHARE
+from canbase_watchdog.unasked_torque import UnaskedTorque
 
 ALIKE_SHARE = 0.05
 """Friction takes as much one way as the other."""
@@ -42,7 +45,8 @@ class Push:
     owes: bool = False
     """It was ordered motion, and has not released the wheel since."""
     overdue_s: float = 0.0
-    """It has pushed enough, nothing is ordered, and it has had power for this long since then [s]."""
+    """It has pushed enough, nothing is ordered, and it has had power for this long since then; at once where it was
+    released for rule 3 before and its encoder has not counted since [s]."""
     vain_s: float = 0.0
     """Rule 2."""
 
@@ -60,6 +64,7 @@ class PushWatch:
         self._tells = self._rests = False
         self._setpoint_mps = self._asked_m = 0.0
         """What was ordered while it was strained, since its last sign of life; infinity: it was released since."""
+        self._unasked = UnaskedTorque(drive.m_per_count, config.stand_impulse_s)
         self._usual = 0.0
         """Torque at the last sign of life, of the rated one; or that which held the wheel when motion was ordered first
         since its last release."""
@@ -77,6 +82,7 @@ class PushWatch:
 
     def trust(self) -> None:
         """A reset was accepted: everything starts again."""
+        self._unasked.trust()
         self.last = Push()
 
     @property
@@ -99,16 +105,21 @@ class PushWatch:
         elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_STEP_S), now_s
         self._tells = self._tells or bool(share)
         known = share if self._tells else None
-        lives = self._lives()
+        step_m = self._step_m()
+        lives = self._life.on_step(step_m)
+        self._unasked.on_step(step_m)
         vain_s = 0.0 if lives else self.last.vain_s
         if lives:
             self._asked_m = 0.0
         if not powered:
+            self._unasked.release()
             self._usual, self._asked_m = 0.0, 0.0 if lives else math.inf
             self.last = Push(known, vain_s=min(vain_s, KEPT_SHARE * self._config.motion_missing_s))
             return
         if lives or not self.last.owes:
             self._usual = known or 0.0
+        rests = self._rests and not self.last.owes and self._config.stand_proof
+        self._unasked.on_torque(known, rests, elapsed_s)
         self.last = self._with_power(known, elapsed_s, lives, vain_s)
 
     def _with_power(self, share: float | None, elapsed_s: float, lives: bool, vain_s: float) -> Push:
@@ -117,7 +128,8 @@ class PushWatch:
         given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
         pushed_s = 0.0 if lives else min(self.last.pushed_s + given_s, config.stand_impulse_s)
         overdue = owes and self._rests and config.stand_proof and pushed_s >= config.stand_impulse_s
-        overdue_s = min(self.last.overdue_s + elapsed_s, config.stand_answer_s) if overdue else 0.0
+        overdue_s = self.last.overdue_s + elapsed_s if overdue or self._unasked.is_due else 0.0
+        overdue_s = config.stand_answer_s if self._unasked.is_dead else min(overdue_s, config.stand_answer_s)
         strain = min(torque, abs(share - self._usual), 1.0) if owes and share is not None else 0.0
         if strain > STRAIN_SHARE and torque > abs(self._usual) + ALIKE_SHARE:
             self._asked_m += abs(self._setpoint_mps) * elapsed_s
@@ -125,10 +137,10 @@ class PushWatch:
             vain_s = min(vain_s + weight * elapsed_s, config.motion_missing_s)
         return Push(share, pushed_s, owes, overdue_s, vain_s)
 
-    def _lives(self) -> bool:
-        """The encoder shows a sign of life."""
+    def _step_m(self) -> float:
+        """Travel of the encoder since the last sample."""
         counts, before = self._counts, self._counts_before
         self._counts_before = counts
         if counts is None or before is None:
-            return False
-        return self._life.on_step(difference(counts, before) * self._m_per_count)
+            return 0.0
+        return difference(counts, before) * self._m_per_count

@@ -5,6 +5,9 @@ So a drive that was ordered motion, and gives torque to a wheel that shows none,
 ordered of all wheels, and gets it back at once: its loop starts again. A wheel that is held on a slope rolls a little
 and is held again; one that friction holds does not notice (docs/decisions/0041).
 
+The same holds where the torque changes later, with nothing ordered, and the encoder does not count: the drive works
+against a motion that does not exist (docs/decisions/0123). Where the release does not end that, the watchdog trips.
+
     HELD ──pushed for stand_impulse_s──► LETTING GO ──no axis has torque──► RETURNING ──all enabled──► HELD
 """
 
@@ -22,6 +25,10 @@ LIFE_M, LIFE_COUNTS = 0.001, 2
 """Places that are nearer to each other than this may be jitter; whichever is more. Others are a sign of life."""
 NOISE_SHARE = 0.01
 """Of the rated torque: less moves no wheel."""
+SETTLES_S = 0.1
+"""A drive that holds a wheel again has found its torque so long after the last count, or after its release [s]."""
+HELD_SHARE, CHANGE_SHARE = 0.5, 0.1
+"""Of the rated torque: a slope takes no more; noise changes it by less."""
 LONGEST_SAMPLE_GAP_S = 0.1
 """Time between two samples counts for at most this long [s]."""
 RETURN_S = 1.0
@@ -39,6 +46,10 @@ class Push:
         """Where it is, and between which places it has been, from that of its last sign of life on."""
         self._at = math.inf
         self._owes = self._tells = False
+        self._count_m, self._counted_m = LIFE_COUNTS * abs(m_per_count), 0.0
+        self._unasked_s = self._held_share = 0.0
+        """The change of the torque with nothing ordered, as time at rated torque; and what held the wheel before."""
+        self._settles_s = SETTLES_S
         self.lives = True
         """The last sample was a sign of life of the encoder, or the drive had no torque."""
         self.share: float | None = None
@@ -47,7 +58,7 @@ class Push:
     @property
     def must_let_go(self) -> bool:
         """With nothing ordered, only a release shows whether the wheel is at standstill."""
-        return self._owes and self.pushed_s >= self._limit_s
+        return (self._owes and self.pushed_s >= self._limit_s) or self._unasked_s >= self._limit_s
 
     def on_sample(
         self, travel_m: float, share: float | None, ordered_mps: float, has_torque: bool, now_s: float
@@ -66,6 +77,24 @@ class Push:
         else:
             self.pushed_s = min(self.pushed_s + given_s, self._limit_s)
         self._owes = has_torque and (self._owes or ordered_mps != 0.0)
+        counts = abs(travel_m - self._counted_m) >= self._count_m
+        self._counted_m = travel_m if counts else self._counted_m
+        self._note_change(counts or self._owes or not has_torque, elapsed_s)
+
+    def _note_change(self, begins: bool, elapsed_s: float) -> None:
+        """`begins`: what the torque is from now on is what holds the wheel."""
+        share = self.share
+        if begins or share is None:
+            self._unasked_s, self._settles_s, self._held_share = 0.0, SETTLES_S, 0.0
+            return
+        if self._settles_s > 0.0:
+            self._settles_s -= elapsed_s
+            self._held_share = max(-HELD_SHARE, min(share, HELD_SHARE))
+        changed = abs(share - self._held_share)
+        if abs(share) < NOISE_SHARE or changed <= CHANGE_SHARE:
+            self._unasked_s = 0.0
+        else:
+            self._unasked_s = min(self._unasked_s + changed * elapsed_s, self._limit_s)
 
 
 class Wheel(Protocol):

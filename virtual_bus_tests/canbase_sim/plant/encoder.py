@@ -19,6 +19,8 @@ class EncoderFault:
     """It counts the motion times this: 0 lost, -1 reversed, 0.5 scaled."""
     holds_speed: bool = False
     """The velocity keeps its last value, like a register that is no longer refreshed."""
+    residue_mps: float | None = None
+    """The velocity keeps this value; None: its last one."""
     off_s: float = 0.0
     """Above 0: the factor holds for this long, then all of the motion counts for `on_s`, and so on."""
     on_s: float = 0.0
@@ -66,7 +68,8 @@ class Encoder:
     def suffer(self, fault: EncoderFault, speed_mps: float) -> None:
         """From now on `fault` holds; `speed_mps` was measured last."""
         self._count(fault.factor)
-        self._fault, self._held_mps, self._time_s, self._sign = fault, speed_mps, 0.0, 1.0
+        self._fault, self._time_s, self._sign = fault, 0.0, 1.0
+        self._held_mps = speed_mps if fault.residue_mps is None else fault.residue_mps
 
     def heal(self) -> None:
         """From now on it counts every motion; what it has missed is lost."""

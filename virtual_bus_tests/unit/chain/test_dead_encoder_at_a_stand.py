@@ -18,6 +18,8 @@ from canbase_driver.drives.let_go import LetGo
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
+from canbase_sim.plant.base import PlantParameters
+from canbase_sim.world.bench import Bench
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State
 from support.chain_world import STEP_S, World, bench_robot, world_of
@@ -349,4 +351,76 @@ def test_a_robot_that_wants_no_proof_is_never_let_go_of() -> None:
     world.bench.base.push_n = 0.1 * SLOPE_N
     world.command = Twist2D.ZERO
     assert count_of(world, 5.0) == 0
+    well(world)
+
+
+# --- frozen with nothing ordered at all
+
+
+def frozen(kind: str, residue_mps: float, bandwidth_radps: float, push_n: float = 0.0) -> Course:
+    """At standstill, after an order and its release: the encoder counts nothing from now on, and shows the residue."""
+    world = World() if kind == "bench" else world_of(kind)
+    body = PlantParameters(bandwidth_radps=bandwidth_radps)
+    world.bench = Bench(world.robot, world.now_s, body)
+    world.drive(seconds=0.5)
+    world.bench.base.push_n = push_n
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    drive = world.robot.drives[0]
+    given = {"axis": drive.axis, "residue_mps": residue_mps}
+    faults.apply(world.bench.nodes, drive.node_id, "encoder_ghost", world.now_s, given)
+    return course(world, 2.5)
+
+
+IMPLAUSIBLE = TripCause.FEEDBACK_IMPLAUSIBLE
+
+
+@pytest.mark.parametrize("kind", ["bench", "zlac8015d"])
+@pytest.mark.parametrize(("residue_mps", "off_s"), [(0.0005, 0.3), (0.003, 0.2), (-0.01, 0.2), (0.04, 0.2)])
+def test_a_frozen_encoder_that_shows_a_residue_takes_the_power_with_nothing_ordered(
+    kind: str, residue_mps: float, off_s: float
+) -> None:
+    """A stiff loop: 8.8 m/s at 0.5 mm/s before, with and without a torque that the drive reports."""
+    seen = frozen(kind, residue_mps, 250.0)
+    assert seen.cause is IMPLAUSIBLE
+    assert seen.off_s <= off_s
+    assert seen.peak_mps <= 0.65
+    assert seen.end_mps == 0.0
+
+
+@pytest.mark.parametrize("residue_mps", [0.00015, -0.00015])
+def test_a_residue_below_what_606ch_may_show_is_found_by_the_torque(residue_mps: float) -> None:
+    """The driver releases the wheel, and where the torque comes again the watchdog knows: no end, 10 m/s, before."""
+    seen = frozen("bench", residue_mps, 250.0)
+    assert seen.cause is AT_STAND
+    assert seen.peak_mps <= 0.4
+    assert seen.end_mps == 0.0
+
+
+def test_a_coarse_606ch_hides_more_and_the_torque_finds_it() -> None:
+    """One bit of 606Ch is 0.52 mm/s there, and four of them are no motion."""
+    seen = frozen("generic", 0.0005, 250.0)
+    assert seen.cause is AT_STAND
+    assert seen.peak_mps <= 0.75
+
+
+def test_a_watchdog_does_not_rely_on_the_driver_there_either(monkeypatch: pytest.MonkeyPatch) -> None:
+    never_lets_go(monkeypatch)
+    seen = frozen("bench", 0.00015, 250.0)
+    assert seen.cause is AT_STAND
+    assert seen.peak_mps <= 1.3
+
+
+@pytest.mark.parametrize("push_n", [15.0, 40.0, 80.0])
+@pytest.mark.parametrize("bandwidth_radps", [60.0, 250.0])
+def test_somebody_who_leans_on_a_base_at_standstill_stops_nothing(push_n: float, bandwidth_radps: float) -> None:
+    """Pushed for 0.5 s, and again from the other side."""
+    world = World()
+    world.bench = Bench(world.robot, world.now_s, PlantParameters(bandwidth_radps=bandwidth_radps))
+    world.drive(seconds=0.5)
+    world.command = Twist2D.ZERO
+    world.run(1.0)
+    for n in range(6):
+        world.bench.base.push_n = (push_n, 0.0, -push_n, 0.0)[n % 4]
+        world.run(0.5)
     well(world)

@@ -10,7 +10,7 @@ import pytest
 
 from canbase_config.robot import Robot
 from canbase_driver.cia402 import Command, DriveState, PowerGoal, next_controlword
-from canbase_driver.drives.let_go import RETURN_S, LetGo, Push
+from canbase_driver.drives.let_go import LIFE_COUNTS, RETURN_S, LetGo, Push
 from support.chain_world import bench_robot
 
 ENABLED, ON, OFF = DriveState.OPERATION_ENABLED, DriveState.SWITCHED_ON, DriveState.SWITCH_ON_DISABLED
@@ -59,7 +59,36 @@ def test_a_torque_that_was_told_once_may_be_zero_then() -> None:
 
 
 def test_without_an_order_nothing_is_owed() -> None:
-    assert samples_until_due(push(), 1.0, ordered_mps=0.0) == 200
+    assert samples_until_due(push(), 0.5, ordered_mps=0.0) == 200
+    assert samples_until_due(push(), None, ordered_mps=0.0) == 200
+
+
+def resting(*shares: float, step_m: float = 0.0) -> Push:
+    """Held with a fifth of the rated torque for 0.2 s, and then with these."""
+    each = push()
+    for n, share in enumerate((*[0.2] * 20, *shares)):
+        each.on_sample(step_m * max(0, n - 19), share, 0.0, True, n * CYCLE_S)
+    return each
+
+
+@pytest.mark.parametrize(
+    ("share", "samples"), [(0.71, 10), (-0.31, 10), (0.5, 17), (0.31, 46), (0.299, 200), (0.101, 200), (0.0, 200)]
+)
+def test_a_torque_that_changes_with_nothing_ordered_has_to_be_released(share: float, samples: int) -> None:
+    """0.05 s of the change at rated torque. A motor without torque is beside a closed brake."""
+    assert not resting(*[share] * (samples - 1)).must_let_go
+    assert resting(*[share] * samples).must_let_go is (samples < 200)
+
+
+def test_a_torque_that_comes_back_or_an_encoder_that_counts_ends_it() -> None:
+    assert not resting(*[0.7] * 6, 0.25, *[0.7] * 6).must_let_go
+    assert not resting(*[0.7] * 100, step_m=LIFE_COUNTS * COUNT_M).must_let_go
+    assert resting(*[0.7] * 30, step_m=COUNT_M / 100).must_let_go
+
+
+def test_more_than_a_slope_takes_is_not_learned_as_what_holds_the_wheel() -> None:
+    assert samples_until_due(push(), 0.6, ordered_mps=0.0) == 200
+    assert samples_until_due(push(), 0.71, ordered_mps=0.0) == 24
 
 
 @pytest.mark.parametrize(("step_m", "due"), [(0.00099, True), (0.00101, False), (-0.00101, False)])
@@ -77,7 +106,7 @@ def test_without_torque_it_owes_nothing_until_the_next_order() -> None:
     assert samples_until_due(each, 1.0) == 5
     each.on_sample(0.0, 0.0, 0.0, False, 0.06)
     for n in range(7, 60):
-        each.on_sample(0.0, 1.0, 0.0, True, n * CYCLE_S)
+        each.on_sample(0.0, 0.5, 0.0, True, n * CYCLE_S)
     assert not each.must_let_go
     each.on_sample(0.0, 1.0, -0.001, True, 0.6)
     assert each.must_let_go

@@ -16,7 +16,7 @@ from support.evidence_wheel import HZ, Wheel, rolling
 
 
 def test_at_the_start_nothing_speaks_against_a_wheel() -> None:
-    assert Wheel().last == Evidence(trusted=True, unseen=False, ghost=False)
+    assert Wheel().last == Evidence(trusted=True, unseen=False)
 
 
 def test_before_the_first_setpoint_nothing_is_ordered() -> None:

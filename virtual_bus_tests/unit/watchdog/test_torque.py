@@ -85,7 +85,7 @@ def test_it_is_over_with_the_first_sample_without_power_and_owed_again_by_the_ne
     off = bus.run(1, 1.0, powered=False)
     assert (off.pushed_s, off.owes, off.overdue_s) == (0.0, False, 0.0)
     assert off.vain_s == pytest.approx(0.09)
-    assert bus.run(100, 1.0).overdue_s == 0.0
+    assert bus.run(100, 0.5).overdue_s == 0.0
     bus.run(1, 1.0, 0.001)
     assert bus.run(1, 1.0).overdue_s > 0.0
 
@@ -184,6 +184,33 @@ def test_without_an_order_or_a_torque_nothing_is_in_vain() -> None:
     other = Bus()
     other.run(2, None, 0.2, step=10)
     assert other.run(100, None, 0.1).vain_s == 0.0
+
+
+def test_a_torque_that_changes_unasked_has_to_be_released_and_is_a_dead_sensor_the_next_time() -> None:
+    """Half of the rated torque for 0.1 s, then 0.2 s; after a release without a count at once."""
+    bus = Bus()
+    bus.run(20, 0.2)
+    assert bus.run(11, 0.71).overdue_s == pytest.approx(0.02)
+    assert bus.run(18, 0.71).overdue_s == pytest.approx(0.2)
+    bus.run(1, 0.0, powered=False)
+    assert not bus.watch.overdue
+    bus.run(20, 0.2)
+    assert bus.run(4, 0.71).overdue_s == 0.0
+    assert bus.run(1, 0.71).overdue_s == CONFIG.stand_answer_s
+    assert bus.watch.lies
+
+
+@pytest.mark.parametrize("change", [{"rests": False}, {"setpoint": 0.01}])
+def test_only_with_nothing_ordered_of_any_wheel_it_is_unasked(change: dict[str, float]) -> None:
+    bus = Bus()
+    bus.run(20, 0.2)
+    assert bus.run(200, 0.7, **change).overdue_s == 0.0  # type: ignore[arg-type]
+
+
+def test_a_robot_that_needs_no_proof_may_change_its_torque() -> None:
+    bus = Bus(proof=False)
+    bus.run(20, 0.2)
+    assert bus.run(500, 0.9).overdue_s == 0.0
 
 
 def test_a_reset_begins_anew() -> None:
