@@ -6,8 +6,6 @@ switched off: each has a range that excludes 0 and infinity. Frames and units fo
 
 from __future__ import annotations
 
-import difflib
-from importlib.metadata import entry_points
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
@@ -37,12 +35,6 @@ WATCHDOG_NODE_ID = 126
 """CANopen node id of the watchdog: its heartbeat is COB-ID 77Eh, its state 1FEh, its reset request 27Eh."""
 LONGEST_STOP_S = 20.0
 """A base that needs longer for an ordinary stop cannot be supervised [s]."""
-ADAPTERS: Final = (
-    "canalystii", "cantact", "etas", "gs_usb", "iscan", "ixxat", "kvaser", "neousys", "neovi", "nican", "nixnet",
-    "pcan", "robotell", "seeedstudio", "serial", "slcan", "socketcan", "socketcand", "systec", "udp_multicast",
-    "usb2can", "vector", "virtual",
-)  # fmt: skip
-"""Interfaces of python-can 4; plugins add others."""
 CYCLIC = 9
 """6060h: cyclic synchronous velocity, without ramps in the drive (CiA 402-2)."""
 
@@ -62,17 +54,6 @@ class Bus(Section):
     extra: Annotated[
         dict[str, Any], Field(default_factory=dict, description="further arguments of can.Bus for this interface")
     ]
-
-    @model_validator(mode="after")
-    def _interface_exists(self) -> Bus:
-        if self.interface in ADAPTERS:
-            return self
-        plugins = [plugin.name for plugin in entry_points(group="can.interface")]
-        if self.interface not in plugins:
-            near = difflib.get_close_matches(self.interface.lower(), (*ADAPTERS, *plugins), n=1)
-            expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join((*ADAPTERS, *plugins))}"
-            raise MisfitError(f"python-can has no interface {self.interface!r}; {expected}", ("interface",))
-        return self
 
     @model_validator(mode="after")
     def _extra_adds_only(self) -> Bus:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
-import can.interfaces
 import pytest
 from typer.testing import CliRunner
 
 from canbase_cli.main import app
-from canbase_config import robot
 from canbase_config.errors import ConfigError, key_path
 from canbase_config.load import load_robot
-from canbase_config.robot import ADAPTERS, Bus
 from support.robot_files import LAST_LINE, write
 
 END = LAST_LINE + 1
@@ -209,10 +205,6 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
         {END: "action: {min_speed_mps: 0.5}"},
         ":36: action.min_speed_mps: max_speed_mps (0.5) must be greater than min_speed_mps (0.5)",
     ),
-    "an adapter that python-can does not know": (
-        {2: "  interface: socketcn"},
-        ":2: bus.interface: python-can has no interface 'socketcn'; did you mean socketcan?",
-    ),
     "an argument of the bus given twice": (
         {4: "  extra: {channel: can1}"},
         ":4: bus.extra.channel: channel is a key of bus itself; extra only adds arguments",
@@ -377,17 +369,3 @@ def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_key_paths_are_written_as_people_write_them() -> None:
     assert key_path(("drives", 1, "gear_ratio")) == "drives[1].gear_ratio"
     assert key_path(()) == ""
-
-
-def test_the_known_adapters_are_those_of_python_can() -> None:
-    assert sorted(ADAPTERS) == sorted(can.interfaces.BACKENDS)
-
-
-def test_an_adapter_of_a_plugin_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    plugin = EntryPoint("mine", "mine:Bus", "can.interface")
-    monkeypatch.setattr(robot, "entry_points", lambda group: [plugin] if group == "can.interface" else [])
-    assert Bus(interface="mine", channel="0", extra={}).interface == "mine"
-    with pytest.raises(ValueError, match="did you mean mine"):
-        Bus(interface="mines", channel="0", extra={})
-    with pytest.raises(ValueError, match=r"expected one of canalystii, .*, virtual, mine"):
-        Bus(interface="x1", channel="0", extra={})
