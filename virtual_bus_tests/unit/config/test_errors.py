@@ -53,7 +53,8 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "a word of YAML 1.1": (
         {31: "    required: no"},
-        ':31: safety.scan.required: got "no", expected true or false (true: without a fresh scan nothing moves)\n'
+        ':31: safety.scan.required: got "no", expected true or false (true: without a fresh scan nothing moves; '
+        "false: blind_mps where it looked)\n"
         "    YAML 1.2 knows no other words for it, and no quotes around them",
     ),
     "a number where text is wanted": (
