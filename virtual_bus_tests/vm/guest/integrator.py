@@ -82,7 +82,7 @@ def support_bundle(robot: Robot) -> Row:
     _link_is_read(files["can/interfaces.json"])
     _says(files["doctor.txt"], "bit rate", "500000 bit/s", "error active", "restart-ms 100, txqueuelen 64")
     _says(files["units/status.txt"], *(unit(part) for part in PARTS), "active (running)")
-    _says(files["journal/canbase.json"], '"CANBASE_STATE":"ENABLED"')
+    _says(files["journal/canbase.json"], '"CANBASE_STATE": "ENABLED"')
     return Row("canbase support-bundle", "after a trip", then=f"{len(files)} files; doctor reads can0")
 
 
