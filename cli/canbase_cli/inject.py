@@ -49,10 +49,10 @@ def inject(
 
     `continue` ends a hang. After `kill` start `canbase up` again. `canbase inject all heal` ends the faults of drives.
 
-    Faults of a drive: aliases, blocked, bus_off, cut, deaf, encoder_frozen, encoder_intermittent, encoder_jumping,
-    encoder_lost, encoder_reversed, encoder_scaled, encoder_zero, extra_boot_up, fault, frozen_encoder, guard_stuck,
-    heal, ignores_setpoints, limited, mute_boot, no_mains, no_requests, power_cycle, reset_node, rpdo_lost, short_emcy,
-    silent, sto, stuck_velocity, tpdo_lost, unbraked, weak.
+    Faults of a drive: aliases, blocked, bus_off, cut, deaf, encoder_frozen, encoder_ghost, encoder_intermittent,
+    encoder_jumping, encoder_lost, encoder_reversed, encoder_scaled, encoder_zero, extra_boot_up, fault, frozen_encoder,
+    guard_stuck, heal, ignores_setpoints, limited, mute_boot, no_mains, no_requests, power_cycle, reset_node, rpdo_lost,
+    short_emcy, silent, sto, stuck_velocity, tpdo_lost, unbraked, weak.
 
     Exit codes: 0 done, 1 the target does not run or the simulator refuses, 2 wrong command line or robot.yaml.
     """
