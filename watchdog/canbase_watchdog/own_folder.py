@@ -13,6 +13,7 @@ import os
 import stat
 from pathlib import Path
 
+UID_MAP, OVERFLOW_UID = Path("/proc/self/uid_map"), Path("/proc/sys/kernel/overflowuid")
 MOST_LINKS = 40
 """In one path, as the kernel has it."""
 _OPEN = os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -27,6 +28,25 @@ class FolderError(OSError):
 
     def __str__(self) -> str:
         return str(self.strerror)
+
+
+def users_outside(uid_map: str, overflow_uid: str) -> frozenset[int]:
+    """The number that stands for all users outside of this user namespace, root among them; empty: all are inside.
+
+    A container without root shows `/` as a folder of that user. Which of them it belongs to cannot be told: whoever
+    starts the container chooses the folders in it. Raises ValueError for other texts (user_namespaces(7)).
+    """
+    number = int(overflow_uid)
+    ranges = ((int(first), int(count)) for first, _, count in (line.split() for line in uid_map.splitlines()))
+    return frozenset() if any(first <= number < first + count for first, count in ranges) else frozenset((number,))
+
+
+def _trusted() -> frozenset[int]:
+    try:
+        outside = users_outside(UID_MAP.read_text(), OVERFLOW_UID.read_text())
+    except (OSError, ValueError):  # without /proc nobody else is trusted
+        outside = frozenset()
+    return outside | {0, os.geteuid()}
 
 
 def open_own_folder(path: Path, mode: int | None = None) -> int:
@@ -75,7 +95,7 @@ def _link(name: str, folder: int, place: Path, make: int | None) -> str | None:
         return None
     if not stat.S_ISLNK(found.st_mode):
         return None
-    if found.st_uid not in (0, os.geteuid()):
+    if found.st_uid not in _trusted():
         raise FolderError(f"the folder {place} is a link of user {found.st_uid}. Remove it")
     return os.readlink(name, dir_fd=folder)
 
@@ -85,7 +105,7 @@ def _judge(found: os.stat_result, place: Path, *, last: bool) -> None:
 
     Above the last one a group may write that is root's, or that by its number is its owner's own (umask 002).
     """
-    if found.st_uid not in (0, os.geteuid()):
+    if found.st_uid not in _trusted():
         raise FolderError(
             f"the folder {place} belongs to user {found.st_uid}, this is user {os.geteuid()}: "
             "that user could take its place. Choose a folder of this user"

@@ -52,6 +52,34 @@ def test_folders_are_made_with_the_mode_and_a_name_that_is_missing_is_an_error(
     os.close(module.open_own_folder(Path("/")))
 
 
+@pytest.mark.parametrize(
+    ("uid_map", "outside"),
+    [
+        ("         0          0 4294967295\n", set()),  # no namespace
+        ("         0       1000          1\n", {65534}),  # unshare --map-root-user
+        ("         0       1000          1\n         1     100000      65533\n", {65534}),
+        ("         0       1000          1\n         1     100000      65534\n", set()),
+        ("     65534       1000          1\n", set()),
+        ("     65535       1000          1\n", {65534}),
+    ],
+)
+def test_users_outside_of_a_user_namespace_have_one_number(module: ModuleType, uid_map: str, outside: set[int]) -> None:
+    assert module.users_outside(uid_map, "65534\n") == outside
+
+
+@pytest.mark.parametrize(("uid_map", "fine"), [("0 1000 1", True), ("0 0 4294967295", False), ("", True), ("x", False)])
+def test_folders_of_users_outside_are_those_of_the_system(
+    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, uid_map: str, *, fine: bool
+) -> None:
+    (tmp_path / "uid_map").write_text(uid_map)
+    (tmp_path / "overflowuid").write_text("65534")
+    monkeypatch.setattr(module, "UID_MAP", tmp_path / "uid_map")
+    monkeypatch.setattr(module, "OVERFLOW_UID", tmp_path / "overflowuid")
+    found = os.stat_result((0o40755, 0, 0, 2, 65534, 65534, 0, 0, 0, 0))
+    with contextlib.nullcontext() if fine else pytest.raises(module.FolderError, match="belongs to user 65534"):
+        module._judge(found, Path("/"), last=False)
+
+
 @pytest.mark.parametrize("deep", [0, 1, 2])
 @pytest.mark.parametrize(("mode", "fine"), [(0o755, True), (0o757, False), (0o1777, True)])
 def test_a_folder_that_everybody_may_write(
