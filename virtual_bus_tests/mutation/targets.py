@@ -109,7 +109,7 @@ TARGETS = (
     _watchdog("ladder", then=("watchdog/story_ladder", "watchdog/story_trips", "chain/reset_as_a_last_rung")),
     _watchdog("stopper", "watchdog/story_ladder", "watchdog/story_trips", then=("chain/reset_as_a_last_rung",)),
     _watchdog("guarding"),
-    _watchdog("copies", "watchdog/second_master"),
+    _watchdog("copies", then=("watchdog/second_master",)),
     _watchdog("second_master"),
     _watchdog("bus_health"),
     _driver("cia402", then=("driver/axis", "chain/layouts_agree")),

@@ -130,4 +130,4 @@ class Ledger:
     @property
     def is_on_disk(self) -> bool:
         """What is wanted now is on disk."""
-        return self._written is self.wanted or self._written == self.wanted
+        return self._written == self.wanted

@@ -9,7 +9,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.received import NEVER, Received
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class CommandReport:
     """The velocity command at one moment."""
 

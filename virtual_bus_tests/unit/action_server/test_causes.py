@@ -91,6 +91,7 @@ def test_nothing_wrong_is_no_cause() -> None:
         almost = aged(almost, name, age_s - 1e-9)
     assert cause_while_driving(almost) is None
     assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active="action"))) is None
+    assert cause_while_driving(with_inputs(GOOD, mux=replace(GOOD_MUX, active=""))) is None
 
 
 @pytest.mark.parametrize(("code", "provoke"), ROWS)

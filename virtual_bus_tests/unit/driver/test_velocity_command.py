@@ -63,6 +63,7 @@ def test_what_is_not_finite_is_refused_counted_and_changes_nothing(bad: float, p
     values[place] = bad
     assert not made.take(Twist2D(*values), 10.15)
     assert (made.refused, made.target(10.1)) == (1, FORWARD)
+    assert made.report(10.15).events == {"commands_refused": 1}
     assert made.report(10.15).age_s == pytest.approx(0.15)
 
 

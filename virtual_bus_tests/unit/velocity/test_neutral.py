@@ -227,6 +227,22 @@ def test_no_motion_reaches_the_base_without_a_zero_since_the_last_motion_while_i
             assert decision.twist.is_zero or (zero_seen and not decision.not_ready)
 
 
+def test_before_anything_was_watched_nothing_is_absent() -> None:
+    arming = Arming(2.0)
+    arming.look("", 1e9, silent=True)
+    assert not arming.armed
+
+
+# silent until 1.9 s, the last of it while the mux hangs ── silent for 0.5 s more: absent for 2 s, if all was watched
+@pytest.mark.parametrize(("pause_s", "armed"), [(0.19, True), (0.21, False), (1.1, False)])
+def test_an_absence_that_the_mux_did_not_watch_begins_again(pause_s: float, armed: bool) -> None:
+    story = Story({"joystick": DEFAULT_SOURCES["joystick"].model_copy(update={"neutral_after_s": 2.0})})
+    story.run(1.9 - pause_s)
+    story.now_s += pause_s - STEP_S
+    story.run(0.5)
+    assert story.decide().sources[0].armed is armed
+
+
 def test_the_mux_decides_often_enough_to_watch_absence() -> None:
     assert BLIND_S > 1.0 / 20.0  # least rates.command_hz
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from canbase_watchdog import frames
-from canbase_watchdog.latch import Entry, Mark, Past, decode, page
+from canbase_watchdog.latch import Entry, Ledger, Mark, Past, decode, page
 from canbase_watchdog.trip_cause import FINE, TripCause, before_the_start
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import ENABLED, FakeDrive, Story
@@ -289,3 +289,64 @@ def test_a_drive_that_an_open_relay_leaves_without_supply_keeps_no_reset_away() 
         story = resumed(past, FakeDrive(1, mute=True), FakeDrive(2, mute=True))
         story.run(1.0)
         assert story.reset(1) == answer
+
+
+# What is wanted on disk, and what is there
+
+
+def test_what_is_wanted_is_on_disk_when_it_was_written() -> None:
+    ledger = Ledger(Past())
+    assert ledger.is_on_disk
+    ledger.want(Mark.LIVE)
+    assert ledger.wanted == Entry(Mark.LIVE, 0, 0, "", 1, opened=False)
+    assert not ledger.is_on_disk
+    ledger.on_written(None, "the disk is full")
+    assert (ledger.is_on_disk, ledger.problem) == (False, "the disk is full")
+    ledger.on_written(ledger.wanted, "")
+    assert (ledger.is_on_disk, ledger.problem) == (True, "")
+
+
+TRIP: dict[str, Any] = {"mark": Mark.LATCHED, "cause": 3, "node_id": 2, "detail": "driver silent", "opened": False}
+
+
+@pytest.mark.parametrize(
+    "change", [{"mark": Mark.LIVE}, {"cause": 4}, {"node_id": 1}, {"detail": "lease lost"}, {"opened": True}]
+)
+def test_any_other_content_is_a_new_request_and_the_same_is_none(change: dict[str, Any]) -> None:
+    ledger = Ledger(Past())
+    ledger.want(**TRIP)
+    first = ledger.wanted
+    ledger.on_written(first, "")
+    ledger.want(**TRIP)
+    assert ledger.wanted is first
+    assert ledger.is_on_disk
+    ledger.want(**TRIP | change)
+    assert ledger.wanted == replace(first, number=2, **change)
+    assert not ledger.is_on_disk
+
+
+# LIVE, written ── CLEAR ── LIVE: the disk may have CLEAR from the second, so the first LIVE is no evidence of the third
+def test_the_same_content_that_was_written_earlier_is_not_on_disk() -> None:
+    ledger = Ledger(Past())
+    ledger.want(Mark.LIVE)
+    first = ledger.wanted
+    ledger.want(Mark.CLEAR)
+    ledger.want(Mark.LIVE)
+    assert ledger.wanted.number == 3
+    ledger.on_written(first, "")
+    assert not ledger.is_on_disk
+
+
+def test_without_a_record_what_is_wanted_counts_as_written() -> None:
+    ledger = Ledger(None)
+    assert ledger.is_on_disk
+    ledger.want(Mark.LIVE)
+    assert ledger.is_on_disk
+
+
+def test_a_record_that_cannot_be_used_is_not_on_disk() -> None:
+    ledger = Ledger(Past(problem="it is damaged"))
+    assert not ledger.is_on_disk
+    ledger.want(Mark.LATCHED, 1)
+    ledger.on_written(ledger.wanted, "")
+    assert ledger.is_on_disk
