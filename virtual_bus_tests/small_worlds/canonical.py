@@ -63,7 +63,7 @@ IGNORED = {
         "StandWatch._counts Push._seen_m"
     ),
     "a place that is at most one sample from the newest one, or the same at standstill": (
-        "Stillness._anchor_m StoppingDistance._from_m"
+        "Stillness._anchor_m StoppingDistance._from_m Push._counted_m"
     ),
     "the motion between two scans: the scanner of a small world sees nothing": "ExpectedMotion._poses",
     "the same object for ever, or told elsewhere: dictionaries, disks": (
