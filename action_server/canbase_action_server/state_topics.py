@@ -1,7 +1,7 @@
 """The topics that a goal depends on: how old the last message may be, and what it means when there is none. A table.
 
 Rules. What is missing counts as the worst that it could report: the goal ends, the base stops, and nothing starts. A
-topic with a second publisher is missing: nobody knows whose message the last one is (`without_contested`).
+topic with a second publisher is missing: the last message does not contain its publisher (`without_contested`).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class StateTopic:
         return received
 
     def second_sender(self, inputs: Inputs, now_s: float) -> str | None:
-        """Who else publishes on it; None: nobody does."""
+        """The sentence about its second publisher; None: it has one alone."""
         found = contested(inputs, now_s).get(self.topic)
         return found and f"{found}; end it (a node that was killed is listed for about 20 s)."
 

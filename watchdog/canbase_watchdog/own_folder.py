@@ -44,7 +44,7 @@ def users_outside(uid_map: str, overflow_uid: str) -> frozenset[int]:
 def _trusted() -> frozenset[int]:
     try:
         outside = users_outside(UID_MAP.read_text(), OVERFLOW_UID.read_text())
-    except (OSError, ValueError):  # without /proc nobody else is trusted
+    except (OSError, ValueError):  # without /proc only root and this user are trusted
         outside = frozenset()
     return outside | {0, os.geteuid()}
 
