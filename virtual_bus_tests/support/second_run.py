@@ -2,7 +2,8 @@
 
 Hundreds of tests measure with the clock of a computer that others use too. One that fails runs once more by
 itself (`--reruns 1` of pytest-rerunfailures, in `make test-real-time`). The first failure is printed whole: it is a
-defect of the test or of canbase, and somebody has to find it.
+defect of the test or of canbase, and somebody has to find it. The tests run in a worker process: an interpreter that
+crashes in the ROS libraries counts as a first failure of its test, and a new worker runs the others.
 """
 
 from __future__ import annotations
