@@ -18,6 +18,7 @@ from canbase_config.stopping import (
     jerk_adds_s,
     max_wheel_mps,
     order_wait_s,
+    slowest_ramp_mps2,
 )
 from canbase_config.units import m_per_count, mps_per_bit, velocity_scale
 from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, WatchedLayout
@@ -25,8 +26,6 @@ from canbase_config.watchdog import RelayLine, WatchdogConfig, WatchedDrive, Wat
 NOMINAL_HZ, LEAST_SAMPLES = 100.0, 2
 """Samples in a row stand for a time, which a slow cycle must not draw out. One bad sample alone may be an outlier."""
 BRAKING_SAMPLES = 3
-SLOWEST_RAMP_SHARE = 0.25
-"""Of the limits' acceleration, where watchdog.slowest_ramp_mps2 is not given."""
 
 
 def speed_noise_mps(robot: Robot) -> float:
@@ -49,16 +48,6 @@ def samples(robot: Robot, count: int) -> int:
 def order_hold_s(robot: Robot) -> float:
     """How long the driver may follow an order that another one has replaced [s]: the jerk limit draws it out."""
     return order_wait_s(robot) + jerk_adds_s(robot.limits)
-
-
-def slowest_ramp_mps2(robot: Robot) -> float:
-    """How fast a wheel gets to its setpoint at least, where robot.yaml does not give it [m/s²].
-
-    A share of what the driver's setpoints do: soft drives, slopes and payload take the rest.
-    """
-    limits = robot.limits
-    turning_mps2 = limits.angular_acceleration_radps2 * robot.base.track_m / 2.0
-    return SLOWEST_RAMP_SHARE * min(limits.acceleration_mps2, turning_mps2)
 
 
 def watchdog_config(robot: Robot) -> WatchdogConfig:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from canbase_config import reserves
+from canbase_config import reserves, tolerances
 from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import PROFILE_SCHEMA
 from canbase_config.robot import Robot
@@ -56,6 +56,39 @@ Every other key that is a time or a rate, and why no rule compares it:
 """
 
 
+_BOUNDS: Final = """\
+## How much the watchdog may forgive
+
+A tolerance that is too wide for a robot hides a failure. A file with more than *at most* (with less, where the row has
+*at least*) is refused, and the message names the bound and where it comes from. The default of a key always passes.
+*Sample*: the value of the bench robot, and the bound for it.
+
+| key | hides beyond that | bound | sample |
+|---|---|---|---|
+"""
+_BY_RANGE: Final = """\
+Every other key below `watchdog`, and what bounds it:
+
+| key | reason |
+|---|---|
+"""
+
+
+def _bounds() -> str:
+    robot = load_robot(sample("bench")).robot
+    rows = [
+        _ROW.format(f"`{row.key}`", _cell(row.hides), f"at {row.word} {_cell(row.rule)}", _bound(robot, row))
+        for row in tolerances.BOUNDS
+    ]
+    others = [f"| `{key}` | {_cell(reason)} |" for key, reason in tolerances.BY_RANGE.items()]
+    return _BOUNDS + "\n".join((*rows, "")) + "\n" + _BY_RANGE + "\n".join((*others, ""))
+
+
+def _bound(robot: Robot, row: tolerances.Bound) -> str:
+    given = row.given(robot)
+    return f"{'default' if given is None else f'{given:g}'}, {row.word} {row.bound(robot):.3g}"
+
+
 def _reserves() -> str:
     robot = load_robot(sample("bench")).robot
     rows = [
@@ -76,6 +109,7 @@ def configuration_page() -> str:
     parts = [
         _HEAD,
         _reserves(),
+        _bounds(),
         *_tables(Schema(Robot), "robot.yaml"),
         _PROFILE_HEAD,
         *_tables(PROFILE_SCHEMA, "profile"),

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
-from canbase_config import bus_load, drive_values, reserves, stopping, units
+from canbase_config import bus_load, drive_values, reserves, stopping, tolerances, units
 from canbase_config.action import Action
 from canbase_config.black_box import BlackBox
 from canbase_config.commissioned import Commissioned
@@ -247,8 +247,9 @@ class Robot(Section):
         return self
 
     @model_validator(mode="after")
-    def _keys_have_their_reserves(self) -> Robot:
+    def _keys_fit_each_other(self) -> Robot:
         reserves.check(self)
+        tolerances.check(self)
         return self
 
     @model_validator(mode="after")

@@ -39,6 +39,8 @@ ROLLING_MPS2: Final = 0.1
 """What a wheel without power loses at least: rolling resistance 0.01 × 9.81 m/s² of a hard wheel on a hard, level floor
 (soft floors, gears and motors brake more; on a slope nothing is known)."""
 
+SLOWEST_RAMP_SHARE: Final = 0.25
+"""Of the limits' acceleration, where watchdog.slowest_ramp_mps2 is not given."""
 HARDEST_SHARE: Final = 2.0
 """A drive brakes at most this many times as hard as its stated ramp: overshoot of its loop, light loads, noise."""
 GRIP_MPS2: Final = 8.0
@@ -179,6 +181,16 @@ def hardest_braking_mps2(robot: Robot, drive: Drive) -> float:
     if kind.options.ramps == "no" or kind.is_unproven("options.ramps") or kind.is_unproven("units.acceleration"):
         return hardest_stop_mps2(robot)
     return HARDEST_SHARE * robot.limits.emergency_deceleration_mps2
+
+
+def slowest_ramp_mps2(robot: Robot) -> float:
+    """How fast a wheel gets to its setpoint at least, where robot.yaml does not give it [m/s²].
+
+    A share of what the driver's setpoints do: soft drives, slopes and payload take the rest.
+    """
+    limits = robot.limits
+    turning_mps2 = limits.angular_acceleration_radps2 * robot.base.track_m / 2.0
+    return SLOWEST_RAMP_SHARE * min(limits.acceleration_mps2, turning_mps2)
 
 
 def _rounded_s(straight_s: float, linear: float, jerk: float) -> float:

@@ -17,7 +17,7 @@ class Relay(Section):
 
 
 class Watchdog(Section):
-    """Times and tolerances of the watchdog. No tolerance can be switched off, and none is unlimited."""
+    """Times and tolerances of the watchdog. No tolerance can be switched off; most are bounded by the limits too."""
 
     latency_s: Annotated[
         float,
@@ -38,22 +38,24 @@ class Watchdog(Section):
         Field(gt=0.0, le=0.5, description="tolerance of a wheel beyond what its setpoints allow, at the rim [m/s]"),
     ] = 0.05
     motion_tolerance_share: Annotated[
-        float, Field(ge=0.0, le=0.5, description="the same as a share of the allowed speed, added to it")
+        float, Field(ge=0.0, le=0.25, description="the same as a share of the allowed speed, added to it")
     ] = 0.1
     feedback_samples: Annotated[
         int,
         Field(
             ge=1,
-            le=20,
+            le=10,
             description="number of bad velocity samples in a row that stops the base; fewer below 100 Hz",
         ),
     ] = 5
     overspeed_factor: Annotated[
-        float, Field(ge=1.05, le=2.0, description="overspeed: a multiple of the speed that the limits allow")
+        float, Field(ge=1.05, le=1.5, description="overspeed: a multiple of the speed that the limits allow")
     ] = 1.2
     travel_tolerance_m: Annotated[
         float,
-        Field(ge=0.005, le=0.5, description="encoder and measured velocity apart, within about 0.25 m of travel [m]"),
+        Field(
+            ge=0.005, le=0.0625, description="encoder and measured velocity apart, within about 0.25 m of travel [m]"
+        ),
     ] = 0.05
     motion_missing_s: Annotated[
         float,
@@ -91,7 +93,7 @@ class Watchdog(Section):
         Field(ge=5.0, le=200.0, description="greater changes of speed are not plausible: the sensor has failed [m/s²]"),
     ] = 20.0
     slow_wheel_share: Annotated[
-        float, Field(ge=0.0, le=0.6, description="a wheel slower than its setpoint, beside motion_tolerance_mps")
+        float, Field(ge=0.0, le=0.5, description="a wheel slower than its setpoint, beside motion_tolerance_mps")
     ] = 0.3
     slow_wheel_s: Annotated[float, Field(ge=0.1, le=3.0, description="a wheel is too slow for this time [s]")] = 0.5
     slowest_ramp_mps2: (
@@ -109,7 +111,7 @@ class Watchdog(Section):
         float, Field(gt=0.0, le=0.2, description="tolerance of the base motion that was not ordered, at the rim [m/s]")
     ] = 0.01
     twist_tolerance_share: Annotated[
-        float, Field(ge=0.0, le=0.3, description="the same as a share of the ordered speed, added to it")
+        float, Field(ge=0.0, le=0.25, description="the same as a share of the ordered speed, added to it")
     ] = 0.08
     twist_s: Annotated[float, Field(ge=0.1, le=3.0, description="... and for this time [s]")] = 0.5
     bus_failed_s: Annotated[

@@ -47,7 +47,7 @@ CHANGES: Final[Mapping[str, Any]] = {
         "progress_timeout_s": 1.0,
         "tolerance_m": 0.002,
     },
-    "watchdog": {"motion_tolerance_mps": 0.5},  # it would stop a base that cannot brake before that overshoots
+    "watchdog": {"motion_tolerance_mps": 0.2},  # it would stop a base that cannot brake before that overshoots
 }
 
 
@@ -193,7 +193,7 @@ def test_canceled(stage: Stage) -> None:
 
 
 def test_overshoot_of_a_base_that_cannot_brake(stage: Stage) -> None:
-    drive = stage.driving(0.5, 0.3)
+    drive = stage.driving(0.5, 0.2)
     stage.robot.node.wait_for(lambda: stage.robot.truth().travel_m > stage.goal_m - LAST_M, END_S, "the end of the way")
     stage.scene.fault("weak")
     assert stage.end_of(drive) == (Status.ABORTED, ErrorCode.OVERSHOOT)

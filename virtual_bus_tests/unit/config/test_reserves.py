@@ -30,7 +30,7 @@ def bench(rates: dict[str, Any], counts: int) -> dict[str, Any]:
     values["drives"] = [{**drive, "counts_per_motor_rev": counts} for drive in values["drives"]]
     values["timeouts"] |= dict.fromkeys(("command_s", "lease_s", "feedback_s", "watchdog_s"), 0.5)
     values["timeouts"] |= {"drive_heartbeat_s": 1.0, "odometry_s": 1.0}
-    values["watchdog"] |= {"travel_tolerance_m": 0.5, "motion_missing_m": 0.1}
+    values["watchdog"] |= {"travel_tolerance_m": 0.0625, "motion_missing_m": 0.1, "motion_missing_s": 0.5}
     values["safety"] |= {"command_timeout_s": 0.5, "reaction_s": 0.5}
     return values
 

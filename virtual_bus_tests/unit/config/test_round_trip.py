@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from canbase_config.effective import effective
 from canbase_config.load import Loaded, leaf_keys, load_robot
 from canbase_config.robot import Robot
+from canbase_config.tolerances import BOUNDS
 
 Values = dict[str, Any]
 
@@ -95,6 +96,7 @@ def made_consistent(values: Values) -> Values:
     action["spin_speed_radps"] = max(action.get("spin_speed_radps", 1.0), 0.4)
     action.pop("require_client_lease", None)  # not together with nav2_behaviors
     make_long_enough(values)
+    make_tight_enough(values)
     for extra in ("interface", "channel", "bitrate"):
         values["bus"].get("extra", {}).pop(extra, None)
     make_mux_consistent(values.get("mux", {}))
@@ -112,11 +114,20 @@ def make_long_enough(values: Values) -> None:
     values["safety"]["command_timeout_s"] = 0.3
     rates = values.setdefault("rates", {})
     rates["odometry_hz"] = max(rates.get("odometry_hz", 50.0), 3.0)
-    watchdog |= {"travel_tolerance_m": 0.5, "motion_missing_m": 0.1}
+    watchdog["travel_tolerance_m"] = 0.0625
     values["base"]["wheel_radius_m"] = min(values["base"]["wheel_radius_m"], 0.1)
     for drive in values["drives"]:
         drive["gear_ratio"] = max(drive["gear_ratio"], 1.0)
         drive["counts_per_motor_rev"] = max(drive["counts_per_motor_rev"], 100)
+
+
+def make_tight_enough(values: Values) -> None:
+    """The keys with a bound are at their defaults; a robot fast enough for its coarse encoders."""
+    values["limits"]["linear_mps"] = max(values["limits"]["linear_mps"], 1.0)
+    for row in BOUNDS:
+        section, name = row.key.split(".")
+        values[section].pop(name, None)
+    values["watchdog"]["motion_missing_m"] = 0.06
 
 
 def make_ordered(section: Values, low: str, high: str) -> None:

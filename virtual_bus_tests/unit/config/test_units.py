@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from canbase_config.derive import order_hold_s, slowest_ramp_mps2, watchdog_config
+from canbase_config.derive import order_hold_s, watchdog_config
 from canbase_config.drive import Drive
 from canbase_config.load import load_robot, sample
 from canbase_config.profile import VelocityUnit
-from canbase_config.stopping import max_wheel_mps
+from canbase_config.stopping import max_wheel_mps, slowest_ramp_mps2
 from canbase_config.units import m_per_count, motor_rev_per_s, mps_per_bit
 from canbase_config.watchdog import WatchdogConfig
 from support.crews import robot_with
