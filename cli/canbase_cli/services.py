@@ -25,6 +25,7 @@ from canbase_cli.options import (
 )
 from canbase_cli.raise_priority import raise_priority
 from canbase_runtime.latch_file import latch_folder
+from canbase_runtime.own_folder import replaced
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.single_instance import TakenError, bus_name, check
 from canbase_runtime.terminal import FAILED, fail, load_config
@@ -189,11 +190,10 @@ def leave_stop_file(robot: Robot, path: Path | None) -> None:
         return
     from canbase_config.derive import watchdog_config
 
-    new = path.with_name(f"{path.name}.new{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        new.write_text(watchdog_config(robot).to_json(), encoding="utf-8")
-        new.replace(path)
+        with replaced(path) as file:
+            file.write(watchdog_config(robot).to_json().encode())
     except OSError as error:
         fail(f"{path} cannot be written: {error}; without it the drives cannot be stopped after a crash", FAILED)
 

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.owner import ETC, old
 from canbase_runtime.latch_file import create_first
-from canbase_runtime.own_folder import open_own_folder
+from canbase_runtime.own_folder import open_own_folder, replaced
 
 COMMAND_S = 60.0
 
@@ -76,15 +76,11 @@ class Executor:
         if self._dry_run:
             return
         self._make_folder(path.parent)
-        new = path.with_name(f".{path.name}.new")
-        new.unlink(missing_ok=True)
-        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with open(descriptor, "w", encoding="utf-8") as file:
-            file.write(text)
+        with replaced(path, private=True) as file:
+            file.write(text.encode())
             if action.group and self._prefix == Path("/"):
-                os.fchown(descriptor, 0, grp.getgrnam(action.group).gr_gid)
-            os.fchmod(descriptor, action.mode)
-        new.replace(path)
+                os.fchown(file.fileno(), 0, grp.getgrnam(action.group).gr_gid)
+            os.fchmod(file.fileno(), action.mode)
 
     def _make_folder(self, folder: Path) -> None:
         """Nobody but root may change it or a folder above it: root works by path below. Raises FolderError."""

@@ -28,6 +28,7 @@ from canbase_doctor.bundle_filter import LINES, Filter, environment, journal_tex
 from canbase_doctor.bundle_words import Words, own_words
 from canbase_doctor.careful_read import RefusedError, modified, names, read_end
 from canbase_doctor.service_environment import service_environment
+from canbase_runtime.own_folder import replaced
 from canbase_runtime.terminal import FAILED, colour, fail
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
@@ -97,16 +98,13 @@ class Bundle:
 
     def write(self, path: Path) -> None:
         """As path, a .tar.gz that its owner alone may read, and that appears whole or not at all."""
-        new = path.with_name(f"{path.name}.new{os.getpid()}")
         folder = path.name.removesuffix(".tar.gz")
         manifest = support.manifest(self.taken, self.missing).encode()
-        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(handle, "wb") as file, tarfile.open(fileobj=file, mode="w:gz") as archive:
+        with replaced(path, private=True) as file, tarfile.open(fileobj=file, mode="w:gz") as archive:
             for name, content in [("MANIFEST.txt", manifest), *sorted(self.files.items())]:
                 entry = tarfile.TarInfo(f"{folder}/{name}")
                 entry.size, entry.mode, entry.mtime = len(content), 0o600, int(time.time())
                 archive.addfile(entry, io.BytesIO(content))
-        new.replace(path)
 
 
 def _regular(path: Path) -> str:

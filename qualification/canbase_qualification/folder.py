@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from canbase_qualification.job import Amount, Load
 from canbase_qualification.software import Software
+from canbase_runtime.own_folder import replaced
 
 NAME: Final = "qualification.json"
 ROBOT: Final = "robot.yaml"
@@ -106,6 +107,5 @@ def _words(load: Load) -> str:
 def write(folder: Path, about: About, robot_yaml: bytes) -> None:
     """OSError. A crash leaves a whole file."""
     for name, data in ((ROBOT, robot_yaml), (NAME, about.text().encode())):
-        new = folder / f"{name}.new"
-        new.write_bytes(data)
-        new.replace(folder / name)
+        with replaced(folder / name) as file:
+            file.write(data)

@@ -26,6 +26,7 @@ from canbase_qualification.report_json import as_json
 from canbase_qualification.report_markdown import markdown
 from canbase_qualification.report_sections import sections
 from canbase_qualification.simulated_robot import simulated
+from canbase_runtime.own_folder import replaced
 
 PAGE, MARKDOWN, JSON = "report.html", "report.md", "report.json"
 LIBRARIES: Final = ("canopen", "pydantic", "python-can")
@@ -120,7 +121,6 @@ def _version(name: str) -> str:
 
 def _written(path: Path, text: str) -> Path:
     """A crash leaves the file as it was."""
-    new = path.with_name(f"{path.name}.new")
-    new.write_text(text, encoding="utf-8")
-    new.replace(path)
+    with replaced(path) as file:
+        file.write(text.encode())
     return path

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import fcntl
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Final
 
 from canbase_qualification.outcome import BrokenLineError, Outcome
+from canbase_runtime.own_folder import replaced
 
 NAME: Final = "results.jsonl"
 
@@ -78,11 +78,7 @@ class ResultsFile:
     def sort(self) -> None:
         """By kind and seed: the same runs give the same file, whoever was faster. A crash leaves the file as it was."""
         places = sorted((outcome.key, at, len(line)) for at, line, outcome in _lines(self.path))
-        new = self.path.with_suffix(".new")
-        with self.path.open("rb") as old, new.open("wb") as file:
+        with self.path.open("rb") as old, replaced(self.path) as file:
             for _, at, length in places:
                 old.seek(at)
                 file.write(old.read(length))
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(self.path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import queue
 import re
 import threading
@@ -11,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
+
+from canbase_runtime.own_folder import replaced
 
 WAITING: Final = 4
 LINES_AT_ONCE: Final = 5
@@ -67,19 +68,12 @@ class InputFiles(threading.Thread):
             self._problem = problem
 
     def _write(self, wall_s: float, cause: str, lines: Lines) -> None:
-        """Under another name first: a reader finds only whole files."""
+        """A reader finds only whole files."""
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         stamp = f"{time.strftime('%Y%m%dT%H%M%S', time.gmtime(wall_s))}.{int(wall_s * 1000.0) % 1000:03d}Z"
         path = self._folder / f"{self._prefix}{stamp}_{re.sub('[^a-z0-9]+', '_', cause.lower())}{SUFFIX}"
-        part = path.with_name(f"{path.name}.part")
-        try:
-            with part.open("w", encoding="utf-8") as file:
-                for piece in _slowly(lines()):
-                    file.write(piece)
-            os.replace(part, path)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+        with replaced(path) as file:
+            file.writelines(piece.encode() for piece in _slowly(lines()))
         for old in sorted(self._folder.glob(f"{self._prefix}*{SUFFIX}"))[: -self._files]:
             old.unlink(missing_ok=True)
 

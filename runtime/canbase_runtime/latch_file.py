@@ -22,7 +22,7 @@ from canbase_runtime import latch_record
 from canbase_runtime import single_instance as sole
 from canbase_runtime.lasting import forgets
 from canbase_runtime.latch_record import Defect, Found, Record
-from canbase_runtime.own_folder import FolderError, open_own_folder
+from canbase_runtime.own_folder import FolderError, open_own_folder, replaced
 
 PARTS: Final = ("driver", "watchdog", "velocity")
 SUFFIX: Final = ".latch"
@@ -82,15 +82,16 @@ def create_first(folder: Path, robot: str) -> bool:
     new.mkdir(mode=0o700)
     try:
         for part in PARTS:
-            path = new / f"{part}{SUFFIX}"
             owner = latch_record.owner_of(part, robot, machine())
-            os.close(_put(str(path), latch_record.whole(Record(), owner)))
-        _sync(str(new))
+            with replaced(new / f"{part}{SUFFIX}", private=True) as file:
+                file.write(latch_record.whole(Record(), owner))
         new.rename(folder)
     except BaseException:
         shutil.rmtree(new, ignore_errors=True)
         raise
-    _sync(str(folder.parent))
+    above = os.open(folder.parent, os.O_DIRECTORY | os.O_CLOEXEC)
+    os.fsync(above)
+    os.close(above)
     return True
 
 
@@ -159,20 +160,10 @@ class LatchFile:
         return replace(found, detail=f"{self.path}: {found.detail}")
 
     def _replace(self, record: Record) -> None:
-        folder, new = open_own_folder(self.path.parent, 0o700), f".{self.path.name}.new"
-        try:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(new, dir_fd=folder)
-            descriptor = _put(new, latch_record.whole(record, self._owner), folder)
-            try:
-                os.rename(new, self.path.name, src_dir_fd=folder, dst_dir_fd=folder)
-                _sync(".", folder)
-            except BaseException:
-                os.close(descriptor)
-                raise
-        finally:
-            os.close(folder)
-        self._descriptor, self._sequence = descriptor, 2
+        os.close(open_own_folder(self.path.parent, 0o700))
+        with replaced(self.path, private=True) as file:
+            file.write(latch_record.whole(record, self._owner))
+        self._descriptor, self._sequence = os.open(self.path, os.O_RDWR | _OPEN), 2
 
 
 def _forgets(path: Path) -> str:
@@ -271,25 +262,3 @@ def _wrong_access(descriptor: int, path: Path) -> str:
     if (file.st_mode | folder.st_mode) & _OTHERS:
         return f"others than user {me} may write {path} or its folder"
     return ""
-
-
-def _put(path: str, data: bytes, folder: int | None = None) -> int:
-    """A new file with these bytes on disk; its descriptor. `folder`: `path` is a name in it."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _OPEN, 0o600, dir_fd=folder)
-    try:
-        if os.write(descriptor, data) != len(data):
-            raise OSError(f"{path}: written in part")
-        os.fsync(descriptor)
-    except BaseException:
-        os.close(descriptor)
-        os.unlink(path, dir_fd=folder)
-        raise
-    return descriptor
-
-
-def _sync(path: str, folder: int | None = None) -> None:
-    descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC, dir_fd=folder)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

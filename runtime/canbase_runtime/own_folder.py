@@ -1,4 +1,4 @@
-"""A folder that only root and this user can change or replace: every folder above it too, from the top.
+"""A folder that only root and this user can change or replace, from the top; and the one way to replace a file.
 
 A process that works by path in a folder of another user opens, replaces and gives away whatever that user puts there.
 So the path is walked with descriptors, and each folder on it is judged before the next one is opened or made in it.
@@ -11,12 +11,16 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 UID_MAP, OVERFLOW_UID = Path("/proc/self/uid_map"), Path("/proc/sys/kernel/overflowuid")
 MOST_LINKS = 40
 """In one path, as the kernel has it."""
 _OPEN = os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class FolderError(OSError):
@@ -82,6 +86,41 @@ def open_own_folder(path: Path, mode: int | None = None) -> int:
             error.filename = str(place)
         raise
     return descriptor
+
+
+@contextmanager
+def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
+    """A file to write. At the end of the block it is on disk (fsync) and takes the place of `path`, file or link.
+
+    Where anything raises, `path` is as it was and nothing is left beside it. `private`: for this user alone; otherwise
+    with the mode, owner and group of the one before. Raises OSError.
+    """
+    folder, new = os.open(path.parent, os.O_DIRECTORY | os.O_CLOEXEC), f".{path.name}.{os.urandom(4).hex()}"
+    before = None
+    try:
+        if not private:
+            with suppress(FileNotFoundError):
+                before = os.stat(path.name, dir_fd=folder)
+        descriptor = os.open(new, _NEW, 0o600 if private or before else 0o666, dir_fd=folder)
+        try:
+            with open(path.with_name(new), "wb", opener=lambda *_: descriptor) as file:
+                if before:
+                    os.fchown(descriptor, before.st_uid, before.st_gid)
+                    os.fchmod(descriptor, before.st_mode & 0o777)
+                yield file
+                file.flush()
+                os.fsync(descriptor)
+            os.rename(new, path.name, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            os.unlink(new, dir_fd=folder)
+            raise
+        try:
+            os.fsync(folder)
+        except OSError as error:
+            if error.errno != errno.EINVAL:  # folders that virtual machines share cannot
+                raise
+    finally:
+        os.close(folder)
 
 
 def _link(name: str, folder: int, place: Path, make: int | None) -> str | None:

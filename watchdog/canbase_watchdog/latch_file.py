@@ -18,7 +18,7 @@ from pathlib import Path
 
 from canbase_watchdog import latch
 from canbase_watchdog.latch import Entry, Past
-from canbase_watchdog.own_folder import open_own_folder
+from canbase_watchdog.own_folder import open_own_folder, replaced
 
 RETRY_S = 1.0
 STACK_BYTES = 512 * 1024
@@ -135,25 +135,10 @@ class Keeper(threading.Thread):
         self._sequence = sequence
 
     def _replace(self, entry: Entry) -> None:
-        """A new file, whole on disk before it gets its name."""
-        folder, new = open_own_folder(self._path.parent, 0o700), f".{self._path.name}.new"
-        try:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(new, dir_fd=folder)
-            descriptor = os.open(new, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, 0o600, dir_fd=folder)
-            try:
-                data = latch.page(entry, 1, self._whose) + latch.page(entry, 2, self._whose)
-                if os.write(descriptor, data) != len(data):
-                    raise OSError("written in part")
-                os.fsync(descriptor)
-                os.rename(new, self._path.name, src_dir_fd=folder, dst_dir_fd=folder)
-                _sync(folder)
-            except BaseException:
-                os.close(descriptor)
-                raise
-        finally:
-            os.close(folder)
-        self._descriptor, self._sequence = descriptor, 2
+        os.close(open_own_folder(self._path.parent, 0o700))
+        with replaced(self._path, private=True) as file:
+            file.write(latch.page(entry, 1, self._whose) + latch.page(entry, 2, self._whose))
+        self._descriptor, self._sequence = os.open(self._path, os.O_RDWR | _FLAGS), 2
 
     def _read(self) -> Past:
         past = self._read_file()
@@ -226,11 +211,3 @@ def _access(descriptor: int, folder: int) -> str:
     if (file.st_mode | parent.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
         return f"others than user {me} may write it or its folder"
     return ""
-
-
-def _sync(folder: int) -> None:
-    descriptor = os.open(".", os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC, dir_fd=folder)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -18,6 +18,7 @@ from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import input_ring
 from canbase_watchdog.input_ring import Cut, InputRing, Trip, TripWatch
 from canbase_watchdog.latch import Past
+from canbase_watchdog.own_folder import replaced
 from canbase_watchdog.watchdog import Watchdog
 
 WAITING = 4
@@ -98,19 +99,12 @@ class TripRecorder(threading.Thread):
         self._problem = problem
 
     def _write(self, trip: Trip, inputs: Cut, wall_offset_s: float) -> None:
-        """Under another name first: a reader finds only whole files."""
+        """A reader finds only whole files."""
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         path = self._folder / f"{self._prefix}{_stamp(trip.at_s + wall_offset_s)}_{_plain(trip.name)}{SUFFIX}"
-        part = path.with_name(f"{path.name}.part")
         first = input_ring.head(self._config, self._past, trip, wall_offset_s)
-        try:
-            with part.open("w", encoding="utf-8") as file:
-                for piece in _slowly(input_ring.lines(first, inputs)):
-                    file.write(piece)
-            part.replace(path)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+        with replaced(path) as file:
+            file.writelines(piece.encode() for piece in _slowly(input_ring.lines(first, inputs)))
         for old in sorted(self._folder.glob(f"{self._prefix}*{SUFFIX}"))[: -self._config.recordings]:
             old.unlink(missing_ok=True)
 

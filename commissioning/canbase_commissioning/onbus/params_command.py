@@ -22,6 +22,7 @@ from canbase_commissioning.parameters.dcf_writer import Heading, dcf_text
 from canbase_commissioning.parameters.saved import Parameters
 from canbase_config.eds_file import Eds, EdsError, read_eds, read_text
 from canbase_config.robot import Bus, Robot
+from canbase_runtime.own_folder import replaced
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
 LISTEN_S: Final = 0.4
@@ -76,7 +77,7 @@ def run_save(
     heading = Heading(out.name, now.strftime("%m-%d-%Y"), now.strftime("%I:%M%p"), bitrate)
     text, encoding = read_text(eds.path)
     try:
-        with out.open("wb" if overwrite else "xb") as file:
+        with replaced(out) if overwrite else out.open("xb") as file:
             file.write(dcf_text(text, eds, found, heading).encode(encoding))
     except OSError as error:
         fail(f"{out} cannot be written: {error.strerror or error}", FAILED)

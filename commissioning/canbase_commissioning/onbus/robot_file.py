@@ -7,6 +7,7 @@ from pathlib import Path
 
 from canbase_commissioning.edits import Edit, edited
 from canbase_config.load import load_robot
+from canbase_runtime.own_folder import replaced
 
 
 def write_edits(config: Path, edits: Sequence[Edit]) -> None:
@@ -15,11 +16,9 @@ def write_edits(config: Path, edits: Sequence[Edit]) -> None:
     Raises OSError, ConfigError or KeyError, with `config` as it was.
     """
     text = config.read_text(encoding="utf-8")
-    new = config.with_name(f".{config.name}.new.yaml")
-    try:
-        new.write_text(edited(text, edits), encoding="utf-8")
-        load_robot(new)
-        config.with_name(f"{config.name}.before").write_text(text, encoding="utf-8")
-        new.replace(config)
-    finally:
-        new.unlink(missing_ok=True)
+    with replaced(config) as file:
+        file.write(edited(text, edits).encode())
+        file.flush()
+        load_robot(file.name)
+        with replaced(config.with_name(f"{config.name}.before")) as before:
+            before.write(text.encode())

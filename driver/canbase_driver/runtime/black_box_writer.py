@@ -24,6 +24,7 @@ from canbase_driver.runtime.black_box import Cut, EventEntry, Recording, asc_lin
 from canbase_driver.runtime.black_box_json import json_lines
 from canbase_driver.runtime.black_box_notes import title
 from canbase_driver.supervision.stop_history import StopRecord
+from canbase_runtime.own_folder import replaced
 
 WAITING = 4
 """Recordings that may wait to be written; more are dropped: a stop every second shows nothing new."""
@@ -189,16 +190,9 @@ class BlackBoxWriter(threading.Thread):
         self._rotate(f"{job.kind}_{self._robot}_")
 
     def _put(self, path: Path, lines: Iterator[str]) -> None:
-        """Under another name first: a reader finds only whole files."""
-        part = path.with_name(f"{path.name}.part")
-        try:
-            with part.open("w", encoding="utf-8") as file:
-                for line in _slowly(lines):
-                    file.write(line)
-            part.replace(path)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+        """A reader finds only whole files."""
+        with replaced(path) as file:
+            file.writelines(line.encode() for line in _slowly(lines))
 
     def _rotate(self, prefix: str) -> None:
         mine = [path for suffix in SUFFIXES for path in self._folder.glob(f"{prefix}*{suffix}")]

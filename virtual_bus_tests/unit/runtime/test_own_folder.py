@@ -1,11 +1,13 @@
-"""Folders that another user could change are refused, at every place of a path; both copies of the module."""
+"""Folders that another user could change are refused, and files are replaced in one way; both copies of the module."""
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import errno
 import os
 import socket
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from types import ModuleType
 
@@ -213,3 +215,122 @@ def test_the_socket_has_its_mode_from_its_first_moment(tmp_path: Path, monkeypat
     finally:
         os.umask(before)
     assert seen == [0o600]
+
+
+@pytest.mark.parametrize("there", [True, False])
+@pytest.mark.parametrize("step", ["block", "fsync", "rename"])
+def test_a_file_that_cannot_be_replaced_is_as_it_was_and_nothing_is_left_beside_it(
+    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, *, there: bool
+) -> None:
+    path = tmp_path / "file"
+    if there:
+        path.write_text("old")
+    descriptors = len(os.listdir("/proc/self/fd"))
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "no space left")
+
+    if step != "block":
+        monkeypatch.setattr(os, step, full)
+    with pytest.raises(OSError, match="no space left"), module.replaced(path) as file:  # noqa: PT012 - a block
+        file.write(b"new")
+        if step == "block":
+            full()
+    assert {each.name: each.read_text() for each in tmp_path.iterdir()} == ({"file": "old"} if there else {})
+    assert len(os.listdir("/proc/self/fd")) == descriptors
+
+
+@pytest.mark.parametrize(("error", "fine"), [(None, True), (errno.EINVAL, True), (errno.EIO, False)])
+def test_a_new_file_is_on_disk_before_it_has_its_name_and_its_folder_after(
+    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: int | None, *, fine: bool
+) -> None:
+    path, rename, steps = tmp_path / "file", os.rename, list[str]()
+
+    def fsync(descriptor: int) -> None:
+        is_folder = os.path.samestat(os.fstat(descriptor), tmp_path.stat())
+        steps.append("folder" if is_folder else os.pread(descriptor, 9, 0).decode())
+        if is_folder and error:
+            raise OSError(error, "cannot")
+
+    def renamed(*names: str, src_dir_fd: int, dst_dir_fd: int) -> None:
+        steps.append("rename")
+        rename(*names, src_dir_fd=src_dir_fd, dst_dir_fd=dst_dir_fd)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "rename", renamed)
+    with contextlib.nullcontext() if fine else pytest.raises(OSError, match="cannot"), module.replaced(path) as file:
+        file.write(b"whole")
+    assert steps == ["whole", "rename", "folder"]
+
+
+@pytest.mark.parametrize(
+    ("before", "private", "after"), [(0o640, False, 0o640), (0o666, True, 0o600), (None, False, 0o644)]
+)
+def test_who_may_read_a_file_stays_and_a_link_is_not_followed(
+    module: ModuleType, tmp_path: Path, before: int | None, after: int, *, private: bool
+) -> None:
+    path, aim = tmp_path / "file", tmp_path / "aim"
+    if before is not None:
+        aim.write_text("kept")
+        aim.chmod(before)
+    path.symlink_to(aim)
+    mask = os.umask(0o022)
+    try:
+        with module.replaced(path, private=private) as file:
+            file.write(b"new")
+            seen = os.fstat(file.fileno()).st_mode & 0o777
+    finally:
+        os.umask(mask)
+    assert seen == path.lstat().st_mode & 0o777 == after
+    assert not path.is_symlink()
+    assert aim.exists() == (before is not None)
+
+
+@pytest.mark.needs_root("give a file to another user")
+def test_a_file_of_another_user_stays_with_that_user(module: ModuleType, tmp_path: Path) -> None:
+    """As robot.yaml of an integrator that `sudo canbase commission` changes."""
+    path = tmp_path / "file"
+    path.touch(0o640)
+    os.chown(path, STRANGER, STRANGER + 1)
+    with module.replaced(path):
+        pass
+    assert (path.stat().st_uid, path.stat().st_gid, path.stat().st_mode & 0o777) == (STRANGER, STRANGER + 1, 0o640)
+
+
+OTHERWISE = {
+    "canbase_driver/runtime/black_box_writer.py": "a probe, which is removed",
+    "canbase_cli/explain.py": "a page for a person, who may name /dev/stdout",
+    "canbase_evidence/gather.py": "a new folder gets its name whole",
+    "canbase_evidence/new_folder.py": "files of that folder",
+    "canbase_qualification/carry_out.py": "in a temporary folder",
+    "canbase_recording/replay_file.py": "in a temporary folder",
+    "canbase_runtime/latch_file.py": "a new folder gets its name whole",
+}
+"""Modules that write, or give a name, without `replaced`."""
+
+
+def _otherwise(source: str) -> Iterator[int]:
+    """Lines with a rename, or with a file that is opened to be overwritten."""
+    for call in ast.walk(ast.parse(source)):
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):
+            name = call.func.attr
+            of_os = isinstance(call.func.value, ast.Name) and call.func.value.id == "os"
+            path_replace = name == "replace" and (of_os or (len(call.args) == 1 and not call.keywords))
+            overwrites = name == "open" and any(
+                isinstance(each, ast.Constant) and each.value in ("w", "wb", "w+", "wt") for each in ast.walk(call)
+            )
+            if name in ("rename", "renames", "write_text", "write_bytes") or path_replace or overwrites:
+                yield call.lineno
+
+
+def test_files_are_replaced_in_one_way() -> None:
+    root = Path(__file__).parents[3]
+    packages = [each.parent for each in root.glob("*/canbase_*/__init__.py") if each.parts[-3] != "virtual_bus_tests"]
+    assert len(packages) > 10
+    found = {
+        str(file.relative_to(package.parent)): lines
+        for package in packages
+        for file in package.rglob("*.py")
+        if file.name != "own_folder.py" and (lines := list(_otherwise(file.read_text(encoding="utf-8"))))
+    }
+    assert set(found) == set(OTHERWISE), found
