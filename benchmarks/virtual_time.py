@@ -13,7 +13,7 @@ from collections.abc import Callable
 from random import Random
 
 from canbase_campaign.can_bus import CanBus
-from canbase_campaign.clock import FINE, Clock
+from canbase_campaign.clock import FINE, Clock, ComputerClock
 from canbase_campaign.driver_process import DriverProcess
 from canbase_campaign.drives import Drives
 from canbase_campaign.process import Topics
@@ -112,8 +112,9 @@ class Chain:
         bus = CanBus(self._clock, random, robot.bus.bitrate)
         self._topics = Topics(self._clock, random, FINE.topic_jitter_s)
         self._drives = Drives(DrawnRobot(0, robot, PlantParameters()), bus)
-        self._driver = DriverProcess(robot, bus, self._topics)
-        self._watchdog = WatchdogProcess(watchdog_config(robot), bus)
+        computer = ComputerClock(self._clock)
+        self._driver = DriverProcess(robot, computer, bus, self._topics)
+        self._watchdog = WatchdogProcess(watchdog_config(robot), computer, bus)
         self._twist, self._sequence = ZERO, 0
         self._order()
         self._clock.run_until(self._clock.now_s + 3.0)

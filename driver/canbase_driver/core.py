@@ -163,9 +163,16 @@ class DriverCore:
         """The bus failed (a sentence), or works (empty); after a failure every node is booted again."""
         self._bus_report = report
         if self._bus_problem and not problem:
-            for node in self._drives.nodes:
-                node.lose("was cut off from the bus", now_s)
+            self._lose_all("was cut off from the bus", now_s)
         self._bus_problem = problem
+
+    def on_suspend(self, now_s: float) -> None:
+        """The computer was suspended, which no age contains: nothing received counts, and every node boots again."""
+        self._lose_all("was not supervised while the computer was suspended", now_s)
+
+    def _lose_all(self, why: str, now_s: float) -> None:
+        for node in self._drives.nodes:
+            node.lose(why, now_s)
 
     def request_stop(self) -> None:
         """Ramp to a stand, take the power away, stay there until a reset. A reset on its way is broken off."""

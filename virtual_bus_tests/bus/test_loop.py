@@ -13,6 +13,7 @@ from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
+from canbase_driver.runtime import control_thread
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.runtime.control_thread import FRAMES_WHEN_LATE, ControlLoop
@@ -38,7 +39,10 @@ class SlowCore(DriverCore):
         super().__init__(robot)
         self._naps_s = list(naps_s)
         self.ticked_at: list[float] = []
-        self.taken = 0
+        self.taken = self.suspends = 0
+
+    def on_suspend(self, now_s: float) -> None:
+        self.suspends += 1
 
     def on_frame(self, frame: Frame, now_s: float) -> list[Frame]:
         self.taken += 1
@@ -76,3 +80,10 @@ def test_cycles_that_were_missed_are_not_made_up_for(robot: Robot, channel: dict
     run_for(core, robot, channel, 1.0)
     after = core.ticked_at[1] + 0.5
     assert len([at for at in core.ticked_at if after < at < after + 0.1]) <= 13
+
+
+def test_a_suspend_is_reported_once(robot: Robot, channel: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    core, times = SlowCore(robot, 0.0), iter((5.0, 5.01, 65.01))
+    monkeypatch.setattr(control_thread, "suspended_s", lambda: next(times, 65.02))
+    run_for(core, robot, channel, 0.1)
+    assert core.suspends == 1

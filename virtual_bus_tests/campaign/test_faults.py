@@ -22,7 +22,7 @@ pytestmark = pytest.mark.campaign
 DRIVES_S, HOLDS_S, LASTS_S = 0.8, 0.6, 1.6
 """Before the fault; until the operator orders zero; in all."""
 BY = ("joystick", "goal")
-SEEN_THE_SAME = {"disk_hangs", "scanner_mirrored", "scanner_clock_slewed", "slip", "wheel_size"}
+SEEN_THE_SAME = {"disk_hangs", "scanner_mirrored", "scanner_clock_slewed", "sender_clock_slewed", "slip", "wheel_size"}
 """Each scan has its direction of counting: the filter sees the same room. A clock that is slewed is within the timeout
 for longer than this. No encoder sees how far a wheel moves the base. No loop waits for a disk."""
 NOT_AT_SPEED = {"driver_never_lets_go", "enables_slowly"}

@@ -9,7 +9,7 @@ import pytest
 
 from canbase_campaign import plan
 from canbase_campaign.can_bus import CanBus, Receiver
-from canbase_campaign.clock import Clock
+from canbase_campaign.clock import Clock, ComputerClock
 from canbase_campaign.envelope import Envelope, moving_s, react_s
 from canbase_campaign.faults import ADDED, FAULTS
 from canbase_campaign.process import Process, Topics
@@ -25,7 +25,7 @@ class Listener(Process):
     name = "listener"
 
     def __init__(self, clock: Clock) -> None:
-        super().__init__(clock)
+        super().__init__(ComputerClock(clock))
         self.heard: list[object] = []
         self.ticks: list[float] = []
         self.begin()

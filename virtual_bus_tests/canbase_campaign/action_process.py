@@ -11,7 +11,7 @@ from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import Outcome
 from canbase_action_server.preconditions import action_source
-from canbase_campaign.clock import Clock
+from canbase_campaign.clock import ComputerClock
 from canbase_campaign.process import Process, Topics
 from canbase_config.robot import Robot
 from canbase_driver.snapshot import DriverSnapshot
@@ -42,7 +42,7 @@ class ActionProcess(Process):
 
     name = "action"
 
-    def __init__(self, robot: Robot, clock: Clock, topics: Topics, on_end: Callable[[Goal], None]) -> None:
+    def __init__(self, robot: Robot, clock: ComputerClock, topics: Topics, on_end: Callable[[Goal], None]) -> None:
         super().__init__(clock)
         self._robot, self._topics, self._on_end = robot, topics, on_end
         self._own_source = action_source(robot)

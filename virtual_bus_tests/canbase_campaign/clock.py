@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heappop, heappush
@@ -70,3 +71,49 @@ class Clock:
             self.now_s, _, do, arguments = heappop(events)
             call(do, arguments)
         self.now_s = end
+
+
+class ComputerClock:
+    """CLOCK_MONOTONIC of a computer in a world: it does not run while the computer is suspended, and no timer ends.
+
+    `suspended_s`: how long that was in all, as CLOCK_BOOTTIME shows it [s].
+    """
+
+    def __init__(self, world: Clock) -> None:
+        self._world = world
+        self.suspended_s = 0.0
+        self._suspended_at = math.inf
+        self._timers: list[tuple[float, Callable[..., object], tuple[Any, ...]]] = []
+
+    @property
+    def now_s(self) -> float:
+        """[s]."""
+        return min(self._world.now_s, self._suspended_at) - self.suspended_s
+
+    @property
+    def is_suspended(self) -> bool:
+        """It does not run."""
+        return self._suspended_at < math.inf
+
+    def at(self, when: float, do: Callable[..., object], *arguments: Any) -> None:
+        """Call `do(*arguments)` at `when` [s], by this clock."""
+        if self.is_suspended:
+            self._timers.append((when, do, arguments))
+        else:
+            self._world.at(when + self.suspended_s, do, *arguments)
+
+    def after(self, delay_s: float, do: Callable[..., object], *arguments: Any) -> None:
+        """Call `do(*arguments)` after `delay_s`, by this clock."""
+        self.at(self.now_s + delay_s, do, *arguments)
+
+    def suspend(self) -> None:
+        """Until `resume`."""
+        self._suspended_at = self._world.now_s
+
+    def resume(self) -> None:
+        """It runs again."""
+        self.suspended_s += self._world.now_s - self._suspended_at
+        self._suspended_at = math.inf
+        timers, self._timers = self._timers, []
+        for when, do, arguments in timers:
+            self.at(when, do, *arguments)

@@ -17,13 +17,20 @@ class _File:
         self.data: bytearray | None = bytearray(clear)
         self.writable, self.hangs = True, False
         self._sequence = 2
+        self._before: bytes | None = None
 
     def put(self, page: bytes, sequence: int) -> None:
         """In place of the older page; of a file that was deleted nothing is left, and its writer does not notice."""
         at = latch_record.place_of(sequence)
+        self._before = bytes(self.data) if self.data is not None else None
         if self.data is not None:
             self.data[at : at + SLOT] = page
         self._sequence = sequence
+
+    def forget(self) -> None:
+        """The last write is lost, though the disk has confirmed it; one that was lost before is not."""
+        if self._before is not None and self.data is not None:
+            self.data[:], self._sequence, self._before = self._before, self._sequence - 1, None
 
     @property
     def next(self) -> int:

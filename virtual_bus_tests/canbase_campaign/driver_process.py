@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from canbase_campaign.can_bus import REMOTE, CanBus
-from canbase_campaign.clock import FINE, Pace
+from canbase_campaign.clock import FINE, ComputerClock, Pace
 from canbase_campaign.disk import StopDisk
 from canbase_campaign.process import FRAMES_HELD, Process, Topics
 from canbase_config.robot import DRIVER_NODE_ID, Robot
@@ -29,8 +29,8 @@ class DriverProcess(Process):
 
     name = "driver"
 
-    def __init__(self, robot: Robot, bus: CanBus, topics: Topics, pace: Pace = FINE) -> None:
-        super().__init__(bus.clock)
+    def __init__(self, robot: Robot, clock: ComputerClock, bus: CanBus, topics: Topics, pace: Pace = FINE) -> None:
+        super().__init__(clock)
         self._jitter_s = pace.cycle_jitter_s
         self._robot, self._topics, self._random = robot, topics, bus.random
         self._member = bus.join(self.name, self)
@@ -71,6 +71,11 @@ class DriverProcess(Process):
         """It reports that the base follows commands."""
         return self.core.state is DriverState.ENABLED
 
+    @property
+    def cause(self) -> str:
+        """Why it does not, as it reports it."""
+        return self.core.finding.cause.value
+
     def begin(self) -> None:
         """A new core: nothing is booted, and its record decides what is latched."""
         self.core = DriverCore(self._robot, found=self.disk.found())
@@ -82,6 +87,7 @@ class DriverProcess(Process):
         self.snapshot: DriverSnapshot | None = None
         self._told: tuple[object, object] | None = None
         self._status_at = 0.0
+        self._suspended_s = self.clock.suspended_s
         self.every(self._period_s, self._on_cycle)
 
     def reset(self, on_outcome: list[Outcome]) -> None:
@@ -134,6 +140,9 @@ class DriverProcess(Process):
 
     def _on_cycle(self) -> None:
         now_s = self.clock.now_s
+        before_s, self._suspended_s = self._suspended_s, self.clock.suspended_s
+        if self._suspended_s > before_s:  # as control_thread.py does
+            self.core.on_suspend(now_s)
         self.core.on_bus(self.bus_problem, now_s)
         frames = self.core.tick(now_s, self._random.random() * self._jitter_s)
         self.core.on_record(*self.disk.write(self.core.record))

@@ -110,6 +110,7 @@ class Judge:
         self._pressed_at, self._unheard_at, self._lock_from = math.inf, -math.inf, -math.inf
         self._pressed_gives: dict[str, float] = {}
         """The most that each excuse gave since the button was pressed: what came late then stays late."""
+        self._suspended_s = 0.0
         self._odometry = OdometryJudge(world, self._shown, self.ledger)
         self._goals = GoalJudge(world, self._shown, self.ledger)
         self._motion = MotionJudge(world, self._shown, self.ledger)
@@ -213,6 +214,9 @@ class Judge:
         self.ledger.step(tau_s > 0.0, now_s)
         self._reach.step(tau_s == 0.0)
         self._strangers.step(now_s)
+        if self._world.computer.suspended_s > self._suspended_s:  # neutral start: nothing from before it holds
+            self._suspended_s = self._world.computer.suspended_s
+            self._wishes.on_stop(now_s)
         self._look_at_faults(tau_s, now_s)
         self._check_latches(now_s)
         self._check_speed(tau_s, now_s)

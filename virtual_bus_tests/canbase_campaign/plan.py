@@ -77,15 +77,18 @@ def plan_for(robot: Robot, seed: int, rates: Sequence[int], only: Sequence[str] 
     more = () if only else tuple(_fault(name, Random(f"{seed} {name}"), robot) for name in _added(seed, later))
     plan = replace(plan, faults=(*plan.faults, *more))
     if any(fault.name in LIES for fault in plan.faults):
-        plan = _longer(plan)
+        plan = _longer(plan, LIES_S)
+    suspended_s = sum(fault.duration_s for fault in plan.faults if fault.name == "suspend")
+    if suspended_s:
+        plan = _longer(plan, suspended_s + LIES_S)
     return _with_second_life(plan, pool, random, robot) if random.random() < SECOND_LIFE else plan
 
 
-def _longer(plan: Plan) -> Plan:
-    """Somebody drives on, whatever the scanner shows."""
+def _longer(plan: Plan, by_s: float) -> Plan:
+    """Somebody drives on, whatever happens."""
     first, rest = plan.segments[:1], plan.segments[1:]
-    longer = tuple(replace(segment, duration_s=segment.duration_s + LIES_S) for segment in first)
-    return replace(plan, duration_s=plan.duration_s + LIES_S, segments=(*longer, *rest))
+    longer = tuple(replace(segment, duration_s=segment.duration_s + by_s) for segment in first)
+    return replace(plan, duration_s=plan.duration_s + by_s, segments=(*longer, *rest))
 
 
 def _with_second_life(plan: Plan, pool: Sequence[str], random: Random, robot: Robot) -> Plan:

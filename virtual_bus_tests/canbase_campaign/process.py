@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 from canbase_campaign.can_bus import Receiver
-from canbase_campaign.clock import Clock, call
+from canbase_campaign.clock import Clock, ComputerClock, call
 
 REMEMBERED = 40
 """Messages of each topic, for a replay."""
@@ -21,7 +21,7 @@ class Process(Receiver):
 
     name = ""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: ComputerClock) -> None:
         self.clock = clock
         self.alive = True
         self._hung_by: set[object] = set()
@@ -68,6 +68,8 @@ class Process(Receiver):
         if not self.alive:
             self.alive = True
             self.begin()
+            if self.clock.is_suspended:
+                self.hang("suspend")
 
     def hang(self, by: object) -> None:
         """Stand still until `go_on` was called for everything that stopped it."""

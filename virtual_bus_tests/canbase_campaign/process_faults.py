@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 TORN_AT = 100
 """In a record of stops: within the first of its two pages."""
 TURN_S = 0.01
+SUSPENDED_S = (0.5, 8.0)
+"""Every drive has stopped by itself after less, and every wheel has come to rest: more shows nothing new [s]."""
 PROCESSES = ("driver", "velocity", "watchdog", "action")
 
 
@@ -134,14 +136,47 @@ def _crashes(name: str) -> Kind:
     return Kind(f"{name} is killed again and again", (1.0, 3.0), nothing, *goes_on(crash, live, 0.25))
 
 
-def _suspend(world: World, around: Surroundings, given: Arguments) -> None:
+def _all_hang(world: World, around: Surroundings, given: Arguments, by: str = "load") -> None:
     for name in PROCESSES:
-        world.processes[name].hang("suspend")
+        world.processes[name].hang(by)
+
+
+def _all_go_on(world: World, around: Surroundings, given: Arguments, by: str = "load") -> None:
+    for name in PROCESSES:
+        world.processes[name].go_on(by)
+
+
+def _suspend(world: World, around: Surroundings, given: Arguments) -> None:
+    world.computer.suspend()
+    _all_hang(world, around, given, "suspend")
 
 
 def _resume(world: World, around: Surroundings, given: Arguments) -> None:
+    world.computer.resume()
+    _all_go_on(world, around, given, "suspend")
+
+
+def _old_data(world: World, around: Surroundings, given: Arguments) -> None:
     for name in PROCESSES:
-        world.processes[name].go_on("suspend")
+        world.processes[name].die()
+    for disk in (world.driver.disk, world.watchdog.disk, world.velocity.disk):
+        disk.file.forget()
+
+
+def _slewed(random: Random) -> Arguments:
+    """chrony's fastest, by 1 s; or a clock that has drifted since an unknown time."""
+    rate, since_s = random.choice(((0.0833, 0.0), (0.0005, random.uniform(0.0, 3600.0))))
+    return {"source": random.choice(("joystick", "navigation")), "rate": random.choice((-1.0, 1.0)) * rate,
+            "since_s": since_s}  # fmt: skip
+
+
+def _clock_slewed(world: World, around: Surroundings, given: Arguments) -> None:
+    since_s, rate = world.computer.now_s - given["since_s"], given["rate"]
+    world.velocity.clocks_behind[given["source"]] = lambda now_s: max(-1.0, min(1.0, rate * (now_s - since_s)))
+
+
+def _clock_right(world: World, around: Surroundings, given: Arguments) -> None:
+    world.velocity.clocks_behind.pop(given["source"], None)
 
 
 def _disks(hang: bool) -> Change:
@@ -208,7 +243,14 @@ PROCESS_FAULTS: dict[str, Kind] = {
         *_driver("repeats"),
     ),
     **{f"{name}_crashes": _crashes(name) for name in PROCESSES},
-    "all_hang": Kind("no process gets a processor", (0.05, 1.5), nothing, _suspend, _resume),
+    "all_hang": Kind("no process gets a processor", (0.05, 1.5), nothing, _all_hang, _all_go_on),
+    "suspend": Kind("the computer is suspended: its clock does not run", SUSPENDED_S, nothing, _suspend, _resume),
+    "sender_clock_slewed": Kind("the clock of a source's computer is slewed, or has drifted", LONG, _slewed,
+                                _clock_slewed, _clock_right),
+    "disk_returns_old_data": Kind(
+        "all processes are killed, and find their records of stops without the last write", LONG, nothing,
+        _old_data, _all_restart,
+    ),
     "setpoints_not_sent": Kind(
         "the driver sends no setpoints to one axis", (0.8, 3.0), wheel, _omits, _omits_nothing
     ),

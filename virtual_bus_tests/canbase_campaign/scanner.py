@@ -44,7 +44,10 @@ def _mirrored(scan: Scan) -> Scan:
 
 
 class _Slewed:
-    """Its stamps fall behind by SLEW_S more with each scan, up to `most_s`: chrony's fastest, ten scans a second."""
+    """Its stamps fall behind by SLEW_S more with each scan, up to `most_s`: chrony's fastest, ten scans a second.
+
+    Negative: they run ahead.
+    """
 
     SLEW_S = 0.0083
 
@@ -53,7 +56,7 @@ class _Slewed:
 
     def __call__(self, scan: Scan) -> Scan:
         self._scans += 1
-        behind_s = min(self._scans * self.SLEW_S, self._most_s)
+        behind_s = math.copysign(min(self._scans * self.SLEW_S, abs(self._most_s)), self._most_s)
         return dataclasses.replace(scan, stamp_ns=(scan.stamp_ns or 0) - round(behind_s * 1e9))
 
 
@@ -69,6 +72,7 @@ LIES = {
     "scanner_late": Lie("each scan comes later than the one before", lambda: Late(2.0, per_s=1.0)),
     "scanner_delayed": Lie("each scan comes a second late", lambda: Late(1.0)),
     "scanner_clock_slewed": Lie("chrony slews the clock of a scanner's computer by 1 s", lambda: _Slewed(1.0)),
+    "scanner_clock_ahead": Lie("chrony slews the clock of a scanner's computer ahead by 1 s", lambda: _Slewed(-1.0)),
     "scanner_mirrored": Lie("a scanner counts the other way round", lambda: _mirrored),
 }
 

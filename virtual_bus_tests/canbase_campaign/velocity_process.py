@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 
-from canbase_campaign.clock import FINE, Clock, Pace
+from canbase_campaign.clock import FINE, ComputerClock, Pace
 from canbase_campaign.disk import StopDisk
 from canbase_campaign.process import Process, Topics
 from canbase_config.mux import MuxLock
@@ -17,6 +17,7 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.clearance import Points
 from canbase_velocity.decision import Decision
+from canbase_velocity.delay import Sent
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_state import SafetyFilter
 from canbase_velocity.input_ring import Note, filter_entry, forget, mux_entry
@@ -39,7 +40,7 @@ class VelocityProcess(Process):
     def __init__(
         self,
         robot: Robot,
-        clock: Clock,
+        clock: ComputerClock,
         topics: Topics,
         send_lease: Callable[[bytes, Twist], None],
         pace: Pace = FINE,
@@ -56,6 +57,8 @@ class VelocityProcess(Process):
         topics.subscribe("publishers", self, self._on_publishers)
         self.note: Note = forget
         """Takes each input of the cores and each decision, as in `input_ring.py`."""
+        self.clocks_behind: dict[str, Callable[[float], float]] = {}
+        """By source: its messages have stamps, of a clock that is so far behind this computer's at a time [s]."""
         self.disk = StopDisk("velocity")
         """Its record of the emergency stop, which outlives it."""
         self.begin()
@@ -103,8 +106,10 @@ class VelocityProcess(Process):
 
     def _on_source(self, name: str, twist: Twist) -> None:
         now_s = self.clock.now_s
-        self.note("command", now_s, name, twist.linear_mps, twist.angular_radps, now_s, None)
-        self.mux.on_command(name, twist, now_s)
+        stamp_s = now_s - self.clocks_behind[name](now_s) if name in self.clocks_behind else None
+        times = None if stamp_s is None else (stamp_s, now_s)
+        self.note("command", now_s, name, twist.linear_mps, twist.angular_radps, now_s, times)
+        self.mux.on_command(name, twist, now_s, sent=None if stamp_s is None else Sent(stamp_s, now_s, now_s))
         decision = self._decide()
         if decision.active == name or decision.active != self._active:
             self._send(decision)

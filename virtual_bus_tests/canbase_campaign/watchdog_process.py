@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from canbase_campaign.can_bus import REMOTE, CanBus
-from canbase_campaign.clock import FINE, Pace
+from canbase_campaign.clock import FINE, ComputerClock, Pace
 from canbase_campaign.disk import WatchdogDisk
 from canbase_campaign.process import FRAMES_HELD, Process
 from canbase_config.watchdog import WatchdogConfig
@@ -17,8 +17,8 @@ class WatchdogProcess(Process):
 
     name = "watchdog"
 
-    def __init__(self, config: WatchdogConfig, bus: CanBus, pace: Pace = FINE) -> None:
-        super().__init__(bus.clock)
+    def __init__(self, config: WatchdogConfig, clock: ComputerClock, bus: CanBus, pace: Pace = FINE) -> None:
+        super().__init__(clock)
         self._config, self._tick_s = config, pace.watchdog_tick_s
         self._failed_since = math.inf
         self.disk = WatchdogDisk()
@@ -58,6 +58,7 @@ class WatchdogProcess(Process):
     def begin(self) -> None:
         """A new core, which knows of a trip before by its record."""
         self.core = Watchdog(self._config, self.clock.now_s, self.disk.past())
+        self._suspended_s = self.clock.suspended_s
         self.every(self._tick_s, self._on_tick, phase_s=0.001)
 
     def end(self) -> None:
@@ -84,7 +85,13 @@ class WatchdogProcess(Process):
         if self._failed_since == math.inf:
             self.core.on_frame(cob_id, data, self.clock.now_s)
 
+    def _look_for_a_suspend(self) -> None:
+        before_s, self._suspended_s = self._suspended_s, self.clock.suspended_s
+        if self._suspended_s > before_s:
+            self.core.on_suspend(self._suspended_s - before_s)
+
     def _on_tick(self) -> None:
+        self._look_for_a_suspend()  # as loop.py does
         self.core.on_bus(self._failed_since, 0)
         for frame in self.core.tick(self.clock.now_s):
             if self._failed_since == math.inf:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from canbase_campaign.action_process import ActionProcess, Goal
 from canbase_campaign.can_bus import CanBus
-from canbase_campaign.clock import FINE, Clock, Pace
+from canbase_campaign.clock import FINE, Clock, ComputerClock, Pace
 from canbase_campaign.driver_process import DriverProcess
 from canbase_campaign.drives import Drives
 from canbase_campaign.intruder import Intruder
@@ -50,6 +50,8 @@ class World:
         self.robot = self.drawn.robot
         self.random = Random(seed)
         self.clock = clock = Clock(uptime_s)
+        self.computer = computer = ComputerClock(clock)
+        """The clock of all processes."""
         self.note: Callable[[str], None] = lambda text: None
         self.on_lease: Callable[[Twist], None] = lambda twist: None
         self.on_goal_end: Callable[[Goal], None] = lambda goal: None
@@ -64,10 +66,10 @@ class World:
         self.bus = CanBus(clock, self.random, self.robot.bus.bitrate)
         self.topics = Topics(clock, self.random, pace.topic_jitter_s)
         self.drives = Drives(self.drawn, self.bus, pace, odd)
-        self.driver = DriverProcess(self.robot, self.bus, self.topics, pace)
-        self.watchdog = WatchdogProcess(watchdog_config(self.robot), self.bus, pace)
-        self.velocity = VelocityProcess(self.robot, clock, self.topics, self._lease, pace)
-        self.action = ActionProcess(self.robot, clock, self.topics, lambda goal: self.on_goal_end(goal))
+        self.driver = DriverProcess(self.robot, computer, self.bus, self.topics, pace)
+        self.watchdog = WatchdogProcess(watchdog_config(self.robot), computer, self.bus, pace)
+        self.velocity = VelocityProcess(self.robot, computer, self.topics, self._lease, pace)
+        self.action = ActionProcess(self.robot, computer, self.topics, lambda goal: self.on_goal_end(goal))
         self.intruder = Intruder(self.robot, self.bus, self.topics)
         processes: tuple[Process, ...] = (self.driver, self.watchdog, self.velocity, self.action)
         self.processes = {process.name: process for process in processes}

@@ -32,6 +32,8 @@ OLD_S = 0.5
 """A request that lay in the inbox for longer is refused: this process stood still, and its caller may be gone."""
 FRAMES_WHEN_LATE = 100
 """This many waiting frames are taken in before a cycle that is already late: more than a bus brings in one cycle."""
+SUSPENDED_S = 0.02
+"""CLOCK_BOOTTIME goes on in a suspend and CLOCK_MONOTONIC does not: so much between two cycles is no lateness."""
 LAST_WORDS = 3
 """How often the quick stop is sent on the way out."""
 
@@ -68,6 +70,7 @@ class ControlLoop(threading.Thread):
         self._stops: list[StopRecord] = []
         self._published = (0, core.state)
         self._handed_over_at = 0.0
+        self._suspended_s = suspended_s()
         self.cycle_at = math.inf
         """When the last cycle began [s, monotonic]: a thread that hangs is seen by it. Infinity before the first."""
         self.failure: BaseException | None = None
@@ -186,6 +189,7 @@ class ControlLoop(threading.Thread):
             self._take_in_until(cycle_at)
             self._empty_inbox()
             now_s = self.cycle_at = time.monotonic()
+            self._look_for_a_suspend(now_s)
             self._core.on_bus(self._bus.problem, now_s, self._bus.report)
             if self._keeper is not None:
                 self._core.on_record(self._keeper.written, self._keeper.problem)
@@ -195,6 +199,11 @@ class ControlLoop(threading.Thread):
             self._hand_over_if_due(now_s)
             if now_s - cycle_at > self._period_s:
                 cycle_at = now_s  # cycles that were missed are not made up for
+
+    def _look_for_a_suspend(self, now_s: float) -> None:
+        before_s, self._suspended_s = self._suspended_s, suspended_s()
+        if self._suspended_s > before_s + SUSPENDED_S:
+            self._core.on_suspend(now_s)
 
     def _take_in_until(self, cycle_at: float) -> None:
         """Until then; in a cycle that is late already, what waits: feedback must not starve."""
@@ -252,3 +261,8 @@ def lead() -> None:
         mine = os.sched_getparam(0).sched_priority
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(mine + 1))
+
+
+def suspended_s() -> float:
+    """How long this computer was suspended since its start [s]."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()

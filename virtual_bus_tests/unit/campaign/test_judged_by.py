@@ -15,6 +15,7 @@ from canbase_config import state_age, stopping
 from canbase_hazards import catalogue, stated_times
 from canbase_hazards.formula import evaluate
 from canbase_sim.plant.base import PlantParameters
+from canbase_velocity.base_ready import status_timeout_s
 from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.stopper import FRESH_S
 
@@ -61,6 +62,25 @@ def test_a_state_is_lost_as_the_page_of_actions_states() -> None:
     assert f"`safety_filter/state` {stated_times.STATE_LOST_S:g} s" in page
     assert state_age.STATE_PERIOD_S <= stated_times.STATE_PERIOD_S
     assert state_age.state_timeout_s() <= stated_times.STATE_LOST_S + 1e-9
+
+
+@pytest.mark.parametrize(("status_hz", "odometry_hz", "control_hz"), [
+    (10.0, 50.0, 100.0), (50.0, 1.0, 100.0), (25.0, 30.0, 100.0), (20.0, 7.0, 50.0), (10.0, 10.0, 20.0),
+])  # fmt: skip
+def test_a_status_is_lost_as_the_rows_state_however_seldom_odometry_is_published(
+    status_hz: float, odometry_hz: float, control_hz: float
+) -> None:
+    """motor_driver/status is published with an odometry sample, and those are whole cycles apart."""
+    robot = campaign_robot()
+    rates = robot.rates.model_copy(
+        update={"status_hz": status_hz, "odometry_hz": odometry_hz, "control_hz": control_hz}
+    )
+    robot = robot.model_copy(update={"rates": rates})
+    period_s = state_age.status_period_s(rates)
+    lost_s = stated_times.stated_s("goal_without_the_status_of_the_driver", robot) - 1.0 / robot.action.control_hz
+    assert 0.0 <= lost_s - state_age.state_timeout_s(period_s) + 1e-9 <= 2.0 / control_hz + 2e-9
+    for row in ("status_lost", "topic_of_a_decision_disturbed"):
+        assert stated_times.stated_s(row, robot) >= status_timeout_s(rates) - 1e-9
 
 
 @pytest.mark.parametrize("drawn", [draw_robot(number) for number in range(10)], ids=lambda drawn: str(drawn.number))
