@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
+from pathlib import Path
 
 import uvicorn
 
@@ -33,3 +36,18 @@ def test_the_page_publishes_velocities_of_the_base_and_no_wheel_speeds() -> None
     assert _is_ours(MuxSource(topic="cmd_vel_web", priority=1, timeout_s=0.3))
     assert not _is_ours(MuxSource(topic="cmd_vel_web", type="joint_command", priority=1, timeout_s=0.3))
     assert not _is_ours(None)
+
+
+def test_nothing_of_the_current_folder_is_read_or_written_through_a_link_there(tmp_path: Path) -> None:
+    """NiceGUI would, as it is imported: a stranger's folder would give its bytes to a file of root."""
+    (tmp_path / ".nicegui").mkdir()
+    planted = tmp_path / ".nicegui" / "storage-general.json"
+    planted.write_text('{"planted": true}', encoding="utf-8")
+    planted.with_name(f"{planted.name}.tmp").symlink_to(tmp_path / "victim")
+    said = subprocess.run(
+        [sys.executable, "-c", "import canbase_web.server, nicegui; print(nicegui.app.storage.general)"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    assert said.stdout == "{}\n"
+    assert not planted.is_symlink()
+    assert not (tmp_path / "victim").exists()
