@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+from canbase_cli.middleware import prefer_udp
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from support.ros_harness import Process, TestNode, clear_records, merged, python_argv, reserve_domain, robot_values
@@ -26,9 +27,16 @@ _starts = itertools.count(os.getpid())
 
 @pytest.fixture(scope="session", autouse=True)
 def this_machine_alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """No test talks to another machine, whatever its domain, and none leaves anything behind."""
+    """No test talks to another machine, whatever its domain, and none leaves anything behind.
+
+    DDS as the commands of canbase set it: over shared memory a process under test would wait for a node of the test
+    that does not get the processor, for seconds.
+    """
+    dds = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    prefer_udp(dds)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        for name, value in dds.items():
+            patch.setenv(name, value)
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         patch.delenv("STATE_DIRECTORY", raising=False)
         yield

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import socket
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -29,6 +30,22 @@ def test_log_and_exit_code_of_a_process_that_ends(spawn: Callable[..., Process])
     assert process.wait(20.0) == 3
     assert "to stdout" in process.log()
     assert "to stderr" in process.log()
+
+
+def test_a_process_that_hangs_leaves_the_stacks_of_its_threads_in_its_log(spawn: Callable[..., Process]) -> None:
+    process = spawn("import time\ndef hang(): print('up', flush=True); time.sleep(60)\nhang()")
+    while "up" not in process.log():
+        time.sleep(0.01)
+    process.close()
+    assert process.exit_code == -signal.SIGABRT
+    assert "in hang" in process.log()
+
+
+def test_no_process_uses_shared_memory_in_dds_as_none_of_canbase_does(spawn: Callable[..., Process]) -> None:
+    process = spawn("import rclpy; rclpy.init(); node = rclpy.create_node('a'); print(open('/proc/self/maps').read())")
+    assert process.wait(30.0) == 0
+    assert "librmw_fastrtps" in process.log()
+    assert "/dev/shm/fastrtps" not in process.log()
 
 
 def test_messages_are_repeated_recorded_and_waited_for(test_node: TestNode) -> None:

@@ -5,6 +5,7 @@ Used with the fixtures in conftest.py. Nothing here knows what canbase decides.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -38,7 +39,7 @@ class Process:
         with log_path.open("wb") as log:
             self._popen = subprocess.Popen(
                 list(argv), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-                env={**os.environ, "PYTHONUNBUFFERED": "1", **(env or {})},
+                env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1", **(env or {})},
             )  # fmt: skip
 
     @property
@@ -83,8 +84,12 @@ class Process:
             raise AssertionError(f"still running after {timeout_s} s; its log:\n{self.log()}") from None
 
     def close(self) -> None:
-        """Ends it whatever it does, and reaps it."""
+        """Ends it whatever it does, and reaps it. As systemd ends a service that hangs: its log then has the stacks of
+        its threads."""
         if self._popen.poll() is None:
+            self._popen.send_signal(signal.SIGABRT)
+            with contextlib.suppress(subprocess.TimeoutExpired):  # SIGSTOP holds it
+                self._popen.wait(ABORT_S)
             self._popen.kill()
         self._popen.wait(10.0)
 
@@ -102,6 +107,8 @@ def python_argv(code: str) -> list[str]:
     return [sys.executable, "-c", code]
 
 
+ABORT_S = 0.5
+"""A process ends by SIGABRT within this time [s]."""
 RELEASE_S = 0.2
 """A source commands zero for this long [s]: some of it arrives on a loaded computer too."""
 

@@ -97,11 +97,21 @@ class Chain:
             last = self.state.last
             return last if last is not None and last.cause == cause and detail in last.detail else None
 
-        found = self.node.wait_for(state, CAUSE_S, f"cause {cause} {detail}, state is {self.state.last}")
+        try:
+            found = self.node.wait_for(state, CAUSE_S, f"cause {cause} {detail}")
+        except AssertionError as error:
+            raise AssertionError(f"{error}; {self.newest}") from None
         assert found is not None
         sent_s = self.state.times_s[-1]
         self.node.wait_for(lambda: self.orders.times_s[-1:] >= [sent_s], CAUSE_S, f"an order after the cause {cause}")
         return found
+
+    @property
+    def newest(self) -> str:
+        """The newest state, and how old it and the newest lease are: a lease does not pass through DDS."""
+        now_s = time.monotonic()
+        ages_s = [now_s - at_s for at_s in (*self.state.times_s[-1:], *(1e-9 * lease[2] for lease in self.leases[-1:]))]
+        return f"ages of state and lease: {', '.join(f'{age_s:.2f} s' for age_s in ages_s)}; {self.state.last}"
 
     def drain(self) -> None:
         """Takes all leases that wait at the socket: its queue is short, and a full one refuses the newest."""
