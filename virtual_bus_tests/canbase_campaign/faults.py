@@ -82,6 +82,7 @@ ADDED_LATER = (
     "overvoltage",
     "partition",
     "pushed",
+    "scanner_partly_frozen",
     "scanner_clock_ahead",
     "sender_clock_slewed",
     "settings_lost",

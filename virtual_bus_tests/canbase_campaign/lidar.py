@@ -99,6 +99,20 @@ class Frozen:
         return dataclasses.replace(self._first, stamp_ns=scan.stamp_ns) if self._new_stamps else self._first
 
 
+class FrozenPart:
+    """`share` of the readings, around `towards_rad` (0: ahead), are those of the first scan; the others live."""
+
+    def __init__(self, share: float, towards_rad: float = 0.0) -> None:
+        self._share, self._towards_rad = share, towards_rad
+        self._first: Scan | None = None
+
+    def __call__(self, scan: Scan) -> Scan:
+        """The scan that comes in place of this one."""
+        self._first = self._first or scan
+        kept = np.isnan(blind(math.nan, self._share, self._towards_rad)(scan).ranges_m)
+        return dataclasses.replace(scan, ranges_m=np.where(kept, self._first.ranges_m, scan.ranges_m))
+
+
 class ByTurns:
     """The first `count` scans again and again, by turns, as from a driver that hands out its old buffers."""
 

@@ -12,7 +12,17 @@ import math
 import numpy as np
 import pytest
 
-from canbase_campaign.lidar import ByTurns, Fault, Frozen, Lidar, TwoOnOneTopic, blind, far_from, one_beam_left
+from canbase_campaign.lidar import (
+    ByTurns,
+    Fault,
+    Frozen,
+    FrozenPart,
+    Lidar,
+    TwoOnOneTopic,
+    blind,
+    far_from,
+    one_beam_left,
+)
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import ScanReader
 from canbase_velocity.frozen import FrozenWatch
@@ -82,6 +92,8 @@ def test_where_the_beams_say_nothing_the_base_creeps_or_does_not_go_at_all(fault
         (blind(0.0), StopCause.SCAN_INVALID),
         (Frozen(new_stamps=True), StopCause.SCAN_FROZEN),
         (Frozen(new_stamps=False), StopCause.SCAN_FROZEN),
+        (FrozenPart(0.2), StopCause.SCAN_FROZEN),
+        (FrozenPart(0.1), StopCause.SCAN_FROZEN),
         (ByTurns(2, new_stamps=True), StopCause.SCAN_FROZEN),
         (ByTurns(2, new_stamps=False), StopCause.SCAN_FROZEN),
         (ByTurns(5, new_stamps=True), StopCause.SCAN_FROZEN),
@@ -276,6 +288,44 @@ def test_one_reading_in_range_may_come_again_by_chance_and_many_may_not() -> Non
             told = told or watch.look(scan, 0.05 * number, moves=False)
         assert bool(told) is frozen
         assert not frozen or told.endswith("3 scans by turns")
+
+
+def part_of(
+    frozen: range,
+    seconds: float = 3.0,
+    *,
+    moves: bool = True,
+    noisy: bool = True,
+    old_m: float = 4.0,
+    noise_m: float = 0.002,
+    step_m: float = 0.001,
+) -> str:
+    """What is found in 360 readings of a wall 4 m away in steps of `step_m`, of which `frozen` are always `old_m`."""
+    watch, told, random = FrozenWatch(0.5, noisy=noisy), "", np.random.default_rng(7)
+    for number in range(round(seconds * 20)):
+        ranges_m = np.round((4.0 + random.normal(0.0, noise_m, 360)) / step_m) * step_m
+        ranges_m[[beam % 360 for beam in frozen]] = old_m
+        scan = Scan(ranges_m, -math.pi, math.tau / 360, 0.05, 10.0)
+        told = told or watch.look(scan, 0.05 * number, moves=moves)
+    return told
+
+
+@pytest.mark.parametrize("frozen", [range(30), range(100, 130), range(345, 375), range(330, 360)])
+def test_a_twelfth_that_is_frozen_while_the_base_moves_is_found_wherever_it_is(frozen: range) -> None:
+    assert part_of(frozen) == "30 of its 360 readings, beside each other, the same for 0.5 s of motion"
+    assert part_of(frozen, seconds=0.4) == ""  # not yet
+    assert part_of(frozen[1:]) == ""  # less than a twelfth
+    assert part_of(frozen, moves=False) == ""
+
+
+@pytest.mark.parametrize("old_m", [INF, NAN, 10.0, 0.05, 0.0])
+def test_a_part_without_measurements_is_not_frozen(old_m: float) -> None:
+    assert part_of(range(90), old_m=old_m) == ""
+
+
+def test_equal_readings_by_chance_of_a_coarse_scanner_or_without_noise_are_no_frozen_part() -> None:
+    assert part_of(range(0), 60.0, noise_m=0.003, step_m=0.01) == ""
+    assert part_of(range(180), noisy=False) == ""
 
 
 @pytest.mark.parametrize("command", [Twist(0.0, 5e-324), Twist(5e-324, 0.0), Twist(-5e-324, -5e-324)])
