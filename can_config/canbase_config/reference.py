@@ -40,8 +40,10 @@ _RESERVES: Final = """\
 ## Keys that depend on each other
 
 A timeout must allow for one lost message: two periods, plus the time by which a message may be late. An encoder must
-be fine enough for the tolerance that it is compared with. A file in which a key is less than *at least* is refused, and
-the message names the least value that is accepted. *Sample*: the value of the bench robot, and the least one for it.
+be fine enough for the tolerance that it is compared with. The footprint must contain the wheels, where each side has
+one drive: with more of them the base skids, and turns by a wider track than it has. A file in which a key is less than
+*at least* is refused, and the message names the least value that is accepted. *Sample*: the value of the bench robot,
+and the least one for it.
 
 | key | is for | at least | sample |
 |---|---|---|---|

@@ -1,6 +1,7 @@
 """Keys of robot.yaml that depend on each other, as one table.
 
-How long a timeout has to be for what it waits for, and how fine an encoder for the tolerance that it is compared with.
+How long a timeout has to be for what it waits for, how fine an encoder for the tolerance that it is compared with, and
+how large the footprint for the wheels.
 
 `canbase config check` refuses a file by it, docs/configuration.md shows it, and the campaign draws robots at its edges.
 Pure. A timeout allows for one lost message: two periods, plus the time by which a message may be late.
@@ -64,6 +65,14 @@ def _action_sources(robot: Robot) -> Iterable[Loc]:
 
 def _row(key: str, waits_for: str, rule: str, others: tuple[str, ...], least: Callable[[Robot], float]) -> Reserve:
     return Reserve(key, waits_for, rule, others, least, lambda _robot: (tuple(key.split(".")),))
+
+
+def _footprint(side: str, waits_for: str, rule: str, least: Callable[[Robot], float]) -> Reserve:
+    """Of a base with one drive on each side: with more of them it skids, and turns by a wider track than it has."""
+    loc, other = ("safety", "footprint", side), rule.partition(" ")[0]
+    return Reserve(
+        ".".join(loc), waits_for, rule, (other,), least, lambda robot: (loc,) * (len(robot.drives) == 2), suffices=False
+    )
 
 
 def _increments_m(robot: Robot, number: float) -> float:
@@ -147,6 +156,14 @@ RESERVES: Final = (
         f"{COUNTS_OF_LIFE:g} increments of the coarsest encoder",
         (COUNTS,),
         lambda robot: _increments_m(robot, COUNTS_OF_LIFE),
+    ),
+    *(
+        _footprint(f"{side}_m", f"the {side} wheel", "base.track_m / 2", lambda robot: robot.base.track_m / 2.0)
+        for side in ("left", "right")
+    ),
+    *(
+        _footprint(f"{end}_m", "the wheels at x = 0", "base.wheel_radius_m", lambda robot: robot.base.wheel_radius_m)
+        for end in ("front", "rear")
     ),
 )
 

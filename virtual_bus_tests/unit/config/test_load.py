@@ -224,9 +224,9 @@ def test_no_radio_gap_arms_a_source(tmp_path: Path, after_s: str) -> None:
 
 
 def test_whole_numbers_do_for_numbers(tmp_path: Path) -> None:
-    robot = load(tmp_path, {9: "    gear_ratio: 20", 18: "  wheel_radius_m: 1"}).robot
+    robot = load(tmp_path, {9: "    gear_ratio: 20", 21: "  linear_mps: 1"}).robot
 
-    assert (robot.drives[0].gear_ratio, robot.base.wheel_radius_m) == (20.0, 1.0)
+    assert (robot.drives[0].gear_ratio, robot.limits.linear_mps) == (20.0, 1.0)
 
 
 def test_hexadecimal_exponents_and_separated_thousands(tmp_path: Path) -> None:

@@ -107,6 +107,10 @@ def test_the_least_values_of_the_sample_robot() -> None:
             ("safety.reaction_s", "rates.control_hz"): 0.02,
             ("watchdog.travel_tolerance_m", COUNTS): 4.0 * increment_m,
             ("watchdog.motion_missing_m", COUNTS): 8.0 * increment_m,
+            ("safety.footprint.left_m", "base.track_m"): 0.25,
+            ("safety.footprint.right_m", "base.track_m"): 0.25,
+            ("safety.footprint.front_m", "base.wheel_radius_m"): robot.base.wheel_radius_m,
+            ("safety.footprint.rear_m", "base.wheel_radius_m"): robot.base.wheel_radius_m,
         }
     )
 
@@ -117,6 +121,18 @@ def test_encoders_of_twelve_increments_on_a_wheel_without_gear_are_refused_with_
 
     with pytest.raises(ValidationError, match=r"travel_tolerance_m \(0.05\) is too little .* at least 0\.\d+"):
         Robot.model_validate(values)
+
+
+def test_a_footprint_that_leaves_a_wheel_out_is_refused_but_for_a_base_that_skids() -> None:
+    values = load_robot(sample("bench")).robot.model_dump()
+    values["safety"]["footprint"]["right_m"] = 0.2
+    with pytest.raises(
+        ValidationError, match=r"right_m \(0\.2\) is too little for the right wheel: at least 0\.25 \(base"
+    ):
+        Robot.model_validate(values)
+    more = [{**drive, "joint": f"{drive['joint']}_rear", "node_id": drive["node_id"] + 2} for drive in values["drives"]]
+    values["drives"] = [*values["drives"], *more]
+    Robot.model_validate(values)
 
 
 def test_a_source_of_another_topic_may_have_any_timeout() -> None:

@@ -86,6 +86,7 @@ def made_consistent(values: Values) -> Values:
     for key, least in (("deceleration_mps2", 1.0), ("angular_deceleration_radps2", 5.0), ("jerk_mps3", 1.0)):
         limits[key] = max(limits.get(key, 10.0), least)  # it stops in time
     limits["emergency_deceleration_mps2"] = max(limits["emergency_deceleration_mps2"], limits["deceleration_mps2"])
+    safety["footprint"] = {side: max(size_m, 2.5) for side, size_m in safety["footprint"].items()}  # it has the wheels
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
     safety["slow_distance_m"] = safety["stop_distance_m"] + 0.5
     for index, scan in enumerate(safety.get("more_scans", [])):

@@ -75,9 +75,9 @@ def test_several_wheels_of_a_side_stand_one_behind_the_other_inside_the_footprin
 
 
 def test_the_body_is_as_long_and_wide_as_the_footprint_and_lies_where_it_does() -> None:
-    robot = changed("bench", safety__footprint={"front_m": 0.5, "rear_m": 0.1, "left_m": 0.3, "right_m": 0.2})
+    robot = changed("bench", safety__footprint={"front_m": 0.5, "rear_m": 0.1, "left_m": 0.35, "right_m": 0.25})
     body = parsed(robot).tree.link_map["base_link"].visual
-    assert body.geometry.size[:2] == pytest.approx([0.6, 0.5])
+    assert body.geometry.size[:2] == pytest.approx([0.6, 0.6])
     assert body.origin.xyz[:2] == pytest.approx([0.2, 0.05])
     assert body.origin.xyz[2] - body.geometry.size[2] / 2 > 0.0
 

@@ -50,7 +50,7 @@ def test_a_robot_that_was_commissioned_as_it_is() -> None:
 
 def test_a_value_that_was_changed_after_its_step_makes_the_proof_out_of_date() -> None:
     robot = commissioned(WIRED)
-    changed = with_values(robot, base={**robot.model_dump()["base"], "track_m": 0.61})
+    changed = with_values(robot, base={**robot.model_dump()["base"], "track_m": 0.59})
     stale, fine = commissioning_proof.findings(changed)
     assert (stale.standing, fine.standing) == (Standing.STALE, Standing.PRESENT)
     assert "floor" in stale.sentence
