@@ -15,12 +15,11 @@ from canbase_config.object_map import (
     VL_TARGET_VELOCITY,
     place,
 )
-from canbase_config.profile_file import load_profile
 from canbase_config.robot import Robot
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.sdo_client import WRITE_ONLY, Read, SdoAborted, Write
 from canbase_driver.cia402 import decode_statusword
-from canbase_driver.drives.foreign_writes import is_of_scale, set_by_boot
+from canbase_driver.drives.foreign_writes import is_of_scale
 
 COMMANDS: Final = frozenset((CONTROLWORD, MODE, TARGET_VELOCITY, VL_TARGET_VELOCITY))
 """What the driver orders in each cycle; of the first axis."""
@@ -81,12 +80,11 @@ def beside_driver(node_id: int, at: Address, robot: Robot | None) -> str:
             "no power where `expects` in robot.yaml has another value; without an entry there the new value counts. "
             "Until then the watchdog may stop the robot, because the write is a sign of another master"
         )
-    if set_by_boot(at.index, drives[0].kind if drives else load_profile("generic"), drives):
-        return (
-            f"The driver undoes a write to {at}: it boots node {node_id} anew as soon as no motor of it has power. "
-            "Until then the watchdog may stop the robot, because the write is a sign of another master"
-        )
-    return f"The driver does not notice a write to {at}, until the next boot of node {node_id} writes its own value"
+    return (
+        f"After a write to {at} the driver boots node {node_id} anew, as soon as no motor of it has power, and "
+        "what the boot sets gets its value again. Until then the watchdog may stop the robot, because the write is a "
+        "sign of another master"
+    )
 
 
 def status_places(node_id: int, robot: Robot | None) -> tuple[Address, ...]:

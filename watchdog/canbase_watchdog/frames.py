@@ -46,25 +46,11 @@ NMT_COMMANDS = (0x01, 0x02, 0x80, 0x81, 0x82)
 
 CONTROLWORD = 0x6040
 STATUSWORD = 0x6041
-MODE = 0x6060
 POSITION = 0x6064
 VELOCITY = 0x606C
-TARGET = 0x60FF
-VL_TARGET, VL_VELOCITY = 0x6042, 0x6044
-"""Those of mode 2 (CiA 402-2)."""
+VL_VELOCITY = 0x6044
+"""That of mode 2 (CiA 402-2)."""
 AXIS_OFFSET = 0x800
-SELF_STOP = (0x100C, 0x100D, 0x1016, 0x1029)
-"""What a drive monitors of its masters, and what it does without them: guard and life time, heartbeats, error
-behaviour."""
-BRAKING = (0x6007, 0x6046, 0x6049, 0x604A, 0x605A, 0x605E, 0x6084, 0x6085)
-"""How an axis stops: for a lost master, by a quick stop, in a fault, its ramps; in mode 2 its least speed. Those of the
-second one are at + AXIS_OFFSET."""
-SCALE = (0x604C, 0x607E, *range(0x6089, 0x6098), 0x60A8, 0x60A9, 0x60AA)
-"""What one bit of a velocity, a position or a ramp means, and which way is positive: units, factors, polarity."""
-SDO_SERVERS = range(0x1200, 0x1280)
-"""By which identifiers a drive takes SDO requests: those of a further channel are seen by nobody."""
-RPDO_PARAMETERS = range(0x1400, 0x1800)
-"""Which PDOs a drive obeys, and what they contain."""
 QUICK_STOP_WORD = 0x0002
 DISABLE_VOLTAGE_WORD = 0x0000
 

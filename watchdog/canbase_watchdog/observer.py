@@ -381,7 +381,7 @@ class Observer:
     def _on_sdo_request(self, node_id: int, data: bytes, now_s: float) -> bool:
         written = frames.decode_sdo_download(data)
         stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
-        if written is not None and not stops and (written % frames.AXIS_OFFSET in _COMMANDS or _must_stay(written)):
+        if written is not None and not stops:
             self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now_s)
         if not frames.concerns_motion(data):
             self._configured_at[node_id] = now_s
@@ -396,15 +396,3 @@ class Observer:
 
 
 _CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
-
-
-def _must_stay(index: int) -> bool:
-    """The object decides whether, or how, a drive stops: by itself, or by the watchdog's quick stop PDO; or what its
-    numbers mean; or who else may write all that."""
-    return index in _FIXED or index in frames.RPDO_PARAMETERS or index in frames.SDO_SERVERS
-
-
-_OF_AN_AXIS = (*frames.BRAKING, *frames.SCALE)
-_FIXED = frozenset((*frames.SELF_STOP, *_OF_AN_AXIS, *(index + frames.AXIS_OFFSET for index in _OF_AN_AXIS)))
-_COMMAND_INDEXES = (frames.CONTROLWORD, frames.MODE, frames.TARGET, frames.VL_TARGET)
-_COMMANDS = frozenset(index % frames.AXIS_OFFSET for index in _COMMAND_INDEXES)

@@ -7,8 +7,8 @@ Signs, each while a drive that it concerns is enabled or at any time where that 
 2. more SYNCs or driver's heartbeats than half as many again as configured; more heartbeats of the watchdog's node, or
    answers to node guarding, than its own: by them somebody else could keep a drive alive when this computer fails.
    Counted over a window that is long against any burst: a loaded machine delivers late, yet not more;
-3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes its controlword, target or mode,
-   or one of the objects that decide how it stops (1016h, 6007h, the RPDOs, ...).
+3. once: an NMT command to an enabled drive, a quick stop PDO, or an SDO that writes any of its objects, but "disable
+   voltage". No list of the objects by which a drive stops, brakes or measures would be complete.
    The driver does none of them there. The watchdog does, but only after a trip, when signs are not looked for.
 
 A gateway or bridge that sends frames again gives the signs of 2, and of 1 the SYNCs: each Sign has whether copies of

@@ -1,6 +1,8 @@
-"""Writes of another client to what the boot of a node has set or compared: a tool, another master. CiA 301.
+"""Writes of another client to a node of ours: a tool, another master. CiA 301.
 
-An SDO answer goes to all that listen. One that confirms a write which the boot did not make shows such a client.
+An SDO answer goes to all that listen. One that confirms a write which the driver did not make shows such a client.
+Every object counts, because no list of those by which a drive stops or measures would be complete; but not what the
+driver commands by SDO itself, and the watchdog's "disable voltage".
 """
 
 from __future__ import annotations
@@ -9,18 +11,15 @@ from collections.abc import Sequence
 from typing import Final
 
 from canbase_config.drive import Drive
-from canbase_config.object_map import AXIS_OFFSET
-from canbase_config.profile import SDO_SERVERS, STOPPED_BY, Profile
+from canbase_config.object_map import AXIS_OFFSET, CONTROLWORD, TARGET_VELOCITY, VL_TARGET_VELOCITY
 from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.boot.vl_settings import FACTOR
 from canbase_driver.cia301.frame import Frame
 
-PDOS: Final = range(0x1400, 0x1C00)
-"""Which PDOs the drive obeys and sends, and what they contain."""
-RAMPS: Final = (0x6083, 0x6084, 0x6085)
-VL: Final = (0x6046, 0x6048, 0x6049, 0x604A)
-"""Limits and ramps of mode 2."""
+_COMMANDED: Final = frozenset(
+    index + offset for index in (CONTROLWORD, TARGET_VELOCITY, VL_TARGET_VELOCITY) for offset in (0, AXIS_OFFSET)
+)
 _WRITTEN: Final = 3 << 5
 """First byte of the answer to a Write (CiA 301, SDO download)."""
 _COMMAND: Final = 7 << 5
@@ -35,38 +34,13 @@ def is_of_scale(index: int, drives: Sequence[Drive] = ()) -> bool:
     return index in of_an_axis or index - AXIS_OFFSET in of_an_axis or index in noted
 
 
-def set_by_boot(index: int, kind: Profile, drives: Sequence[Drive] = ()) -> bool:
-    """Whether another client's write to this object makes the driver boot a node of this kind anew.
-
-    `drives`: of that node, whose `expects` count too.
-    """
-    return index in PDOS or index in SDO_SERVERS or index in _objects(kind, drives)
-
-
-def _objects(kind: Profile, drives: Sequence[Drive]) -> frozenset[int]:
-    own = kind.self_stop.vendor_watchdog
-    axis = (*RAMPS, *VL, *SCALE_OBJECTS, *(index for index in STOPPED_BY if index >= 0x6000))
-    makers = () if own is None or own.index is None else (own.index,)
-    besides = (each.index for each in (*kind.writes.before_mapping, *kind.writes.after_mapping))
-    noted = (each.index for drive in drives for each in drive.expects)
-    return frozenset({*STOPPED_BY, *axis, *(index + AXIS_OFFSET for index in axis), *makers, *besides, *noted})
-
-
-class ForeignWrites:
-    """Looks at the SDO answers of one node that belong to no request of ours."""
-
-    def __init__(self, drives: Sequence[Drive]) -> None:
-        """`drives`: of this node, all of one kind."""
-        self._watched = _objects(drives[0].kind, drives)
-
-    def take(self, frame: Frame) -> str:
-        """The object that another client has written, as "1016h:1"; empty: this answer shows none."""
-        data = frame.data
-        if len(data) != 8 or (data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK):
-            return ""
-        index = int.from_bytes(data[1:3], "little")
-        is_watched = index in self._watched or index in PDOS or index in SDO_SERVERS
-        return f"{index:04X}h:{data[3]}" if is_watched else ""
+def foreign_write(frame: Frame) -> str:
+    """The object that this SDO answer, to no request of ours, shows as written, like "1016h:1"; empty: none."""
+    data = frame.data
+    if len(data) != 8 or (data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK):
+        return ""
+    index = int.from_bytes(data[1:3], "little")
+    return "" if index in _COMMANDED else f"{index:04X}h:{data[3]}"
 
 
 class WritesInBoot:
@@ -75,15 +49,14 @@ class WritesInBoot:
     What the boot has not dealt with yet it sets or compares later. What it never deals with counts when it has ended.
     """
 
-    def __init__(self, foreign: ForeignWrites) -> None:
-        self._foreign = foreign
+    def __init__(self) -> None:
         self._early: dict[bytes, str] = {}
         self._written = ""
 
     def take(self, frame: Frame, boot: NodeBoot) -> None:
         """An SDO answer, before `boot` takes it in."""
         at = frame.data[1:4]
-        name = "" if boot.may_confirm(at) else self._foreign.take(frame)
+        name = "" if boot.may_confirm(at) else foreign_write(frame)
         if name and boot.has_requested(at):
             self._written = name
         elif name:

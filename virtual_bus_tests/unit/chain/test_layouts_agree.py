@@ -13,7 +13,6 @@ from canbase_config.load import load_robot, sample
 from canbase_config.object_map import place
 from canbase_config.profile_file import load_profile, profile_names
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
-from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver import cia402
 from canbase_driver.cia301 import nmt as cia301
 from canbase_driver.cia301 import pdo
@@ -146,10 +145,6 @@ def test_the_watchdog_sees_the_enable_of_mode_2_and_that_none_of_its_stops_follo
     assert frames.asks_for_power(cia402.Command.ENABLE_OPERATION.value | cia402.VL_RAMP)
     stops = [command for command in cia402.Command if command is not cia402.Command.ENABLE_OPERATION]
     assert not any(frames.asks_for_power(command.value | cia402.VL_RAMP) for command in stops)
-
-
-def test_what_the_boot_compares_is_what_nobody_may_write_to_an_enabled_drive() -> None:
-    assert set(frames.SCALE) == set(SCALE_OBJECTS)
 
 
 @pytest.mark.parametrize("name", profile_names())

@@ -281,8 +281,6 @@ def test_nmt_to_an_enabled_drive(command: str, node: str) -> None:
         (0x502, "02 00"),
         (0x602, "2b 40 60 00 00 00 00 00"),
         (0x601, "40 40 60 00 00 00 00 00"),  # reads
-        (0x601, "2b 41 60 00 00 00 00 00"),
-        (0x601, "23 83 60 00 00 00 00 00"),
         (0x601, "2b 40 60"),
         (0x601, "60 40 60 00 00 00 00 00"),
     ],
@@ -390,6 +388,8 @@ def test_commands_that_make_no_sense_are_counted() -> None:
         ("2b 4c 60 01 0a 00 00 00", "604C"),
         ("23 00 12 01 41 06 00 00", "1200"),  # SDO channels: who else may write all that
         ("23 7f 12 02 c1 05 00 00", "127F"),
+        ("2b 73 60 00 00 00 00 00", "6073"),  # the greatest current: without it no motor brakes
+        ("23 0f 20 00 00 00 00 00", "200F"),  # of the manufacturer
         ("c2 16 10 01 04 00 00 00", "1016"),  # block
     ],
 )
