@@ -15,7 +15,6 @@ from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP, Motion, Twist
 from canbase_action_server.motion_limits import standstill_limits
 from canbase_action_server.outcome import ErrorCode, Outcome
-from canbase_action_server.preconditions import action_source
 from canbase_action_server.standstill import Standstill, Verdict
 from canbase_action_server.state_topics import States
 from canbase_config.robot import Robot
@@ -67,7 +66,7 @@ class GoalRun:
         """`motion` begins at `start`. `time_allowance_s`: the client's own limit of the overall time."""
         self._robot = robot
         self._motion = motion
-        self._own_source = action_source(robot)
+        self._own_source = robot.mux.action_source
         overall_s = robot.action.overall_factor * self._motion.ideal_s + robot.action.overall_extra_s
         self._overall_s = min(overall_s, time_allowance_s)
         self._started = self._ticked_at = now_s

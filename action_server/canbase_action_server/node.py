@@ -41,7 +41,6 @@ from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP, Twist
 from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_numbers, rejection, uuid_of
 from canbase_action_server.outcome import ErrorCode, Status
-from canbase_action_server.preconditions import action_source
 from canbase_config.robot import Robot
 from canbase_runtime.chain_topics import CHAIN, Use
 from canbase_runtime.journal import Journal, Voice
@@ -79,7 +78,7 @@ class DriveDistanceServer(Node):
         super().__init__("drive_distance_server")
         refuse_sim_time(self, SetParametersResult)
         self._robot = robot
-        self._own_source = action_source(robot)
+        self._own_source = robot.mux.action_source
         self._goal_queue = GoalQueue(robot)
         self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
         self._budgets = {step: LogBudget() for step in OF_REQUESTS}

@@ -16,19 +16,12 @@ NO_SOURCE = (
 )
 
 
-def action_source(robot: Robot) -> str:
-    """Name under mux.sources of the source on topic cmd_vel_action; empty when there is none."""
-    ours = ("cmd_vel_action", "geometry_msgs/msg/TwistStamped")
-    sources = robot.mux.sources.items()
-    return next((name for name, source in sources if (source.topic, source.message_type) == ours), "")
-
-
 def commanding_program(robot: Robot, states: States) -> str:
     """Name of the source that has the base, if it is a program (neutral_after_s) and not of the goals; else empty."""
     active = states.mux.active if states.mux else ""
     source = robot.mux.sources.get(active)
     is_program = source is not None and source.neutral_after_s is not None
-    return active if is_program and active != action_source(robot) else ""
+    return active if is_program and active != robot.mux.action_source else ""
 
 
 def is_moving(robot: Robot, states: States) -> bool:
@@ -44,7 +37,7 @@ def state_reason(robot: Robot, inputs: Inputs, now_s: float, waits_for_program: 
     """Why the robot cannot start a goal now; None: it can. `waits_for_program`: a program may have the base still."""
     if inputs.shutdown:
         return "the action server is shutting down"
-    if not action_source(robot):
+    if not robot.mux.action_source:
         return NO_SOURCE
     silences = (topic.silence(robot, inputs, now_s) for topic in STATE_TOPICS)
     states = States.at(robot, inputs, now_s)
@@ -69,12 +62,12 @@ def _condition(robot: Robot, states: States) -> str | None:
 def _not_followed(robot: Robot, states: States) -> str | None:
     """The drives have power, and the commands of a goal would not reach them."""
     safety, mux = states.safety, states.mux
-    if mux and mux.active not in ("", action_source(robot)):
+    if mux and mux.active not in ("", robot.mux.action_source):
         return f"{mux.active} drives now; release it first"
     if safety and safety.stops and safety.cause in SCAN_LOST:
         return f"laser scan lost: {safety.detail}; is the scanner running?"
     if safety and safety.stops and safety.cause is not StopCause.OBSTACLE:  # the way back from one is free
         return f"the safety filter stops the base ({safety.cause.value}): {safety.detail}"
     if mux and mux.held_back:
-        return f"velocity_mux holds {action_source(robot)} back: {mux.held_back}; unlock it first"
+        return f"velocity_mux holds {robot.mux.action_source} back: {mux.held_back}; unlock it first"
     return None

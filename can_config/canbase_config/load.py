@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from canbase_config import bus_load
 from canbase_config.commissioned import kind_alone, uncommissioned, uncommissioned_mps, without_proof
+from canbase_config.doubtful_values import doubtful_values
 from canbase_config.errors import ConfigError, Loc, Problem
 from canbase_config.robot import Robot
 from canbase_config.ros_params import plain
@@ -83,7 +84,7 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
     elif robot.safety.require_self_stop and (why := kind_alone(robot)):
         place = file.place(("safety", "require_self_stop"))
         yield Problem(place.file, place.line, place.key, why)
-    for loc, sentence in uncertain_stops(robot):
+    for loc, sentence in (*uncertain_stops(robot), *doubtful_values(robot)):
         place = file.place(loc if loc in file.lines else loc[:-1])
         yield Problem(place.file, place.line, place.key, sentence)
 

@@ -139,6 +139,12 @@ class Mux(Section):
         ),
     ] = None
 
+    @property
+    def action_source(self) -> str:
+        """Name of the source that receives the commands of goals; empty when there is none."""
+        ours = ("cmd_vel_action", "geometry_msgs/msg/TwistStamped")
+        return next((name for name, each in self.sources.items() if (each.topic, each.message_type) == ours), "")
+
     @field_validator("sources", mode="before")
     @classmethod
     def _programs(cls, sources: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -24,6 +25,14 @@ def bus_warnings(bus: Bus, interfaces: Collection[str], network: Path = SYSFS) -
         yield from _socketcan(bus, network)
     elif bus.channel.startswith("/") and not Path(bus.channel).exists():
         yield f"bus.channel is {bus.channel}: there is no such device on this computer; is the adapter plugged in?"
+
+
+def unknown_options(bus: Bus, parameters: Collection[str]) -> Iterator[str]:
+    """Keys of bus.extra that the adapter's class in python-can, with these parameters, has no use for."""
+    for key in bus.extra.keys() - set(parameters):
+        near = difflib.get_close_matches(key, parameters, n=1)
+        instead = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(sorted(parameters))}"
+        yield f"bus.extra.{key} is no option of python-can's {bus.interface}: {instead}"
 
 
 def _socketcan(bus: Bus, network: Path) -> Iterator[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,9 +55,22 @@ def check(
 def _bus_warnings(bus: Bus) -> list[str]:
     from can import VALID_INTERFACES
 
-    from canbase_cli.bus_here import bus_warnings
+    from canbase_cli.bus_here import bus_warnings, unknown_options
 
-    return list(bus_warnings(bus, VALID_INTERFACES))
+    return [*bus_warnings(bus, VALID_INTERFACES), *unknown_options(bus, _options_of(bus.interface) or bus.extra.keys())]
+
+
+def _options_of(interface: str) -> set[str]:
+    """The parameters of python-can's class for it, with those of its base classes; empty: it is not installed here."""
+    from can.interfaces import BACKENDS
+
+    try:
+        module, name = BACKENDS[interface]
+        kinds = getattr(importlib.import_module(module), name).__mro__
+    except (KeyError, ImportError, OSError):  # a vendor's library that is missing, or does not load
+        return set()
+    found = {each for kind in kinds for each in inspect.signature(kind.__init__).parameters}
+    return found - {"self", "args", "kwargs", "channel"}
 
 
 @app.command()

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from canbase_action_server.preconditions import action_source
 from canbase_action_server.state_topics import MUX
 from canbase_config.mux import MEASURED
 from canbase_doctor.check import Check, fail, ok, too_slow, warn
@@ -60,7 +59,7 @@ def mux_owner(seen: Evidence) -> Check:
             )
     if mux is None:
         return fail(name, "velocity_mux publishes nothing", "start canbase velocity")
-    if mux.active not in ("", action_source(seen.robot)):
+    if mux.active not in ("", seen.robot.mux.action_source):
         return fail(name, f"{mux.active} drives", "release it, or end its node")
     return ok(name, mux.active or "no active source")
 

@@ -23,7 +23,6 @@ from sensor_msgs.msg import LaserScan
 from canbase_action_server import messages
 from canbase_action_server.goal_step import goal_step
 from canbase_action_server.inputs import Inputs
-from canbase_action_server.preconditions import action_source
 from canbase_config.load import Loaded
 from canbase_config.mux import MEASURED
 from canbase_config.robot import Robot
@@ -139,7 +138,7 @@ def _evidence(loaded: Loaded, node: Node, listener: Listener, prober: Prober) ->
         namespace=node.get_namespace(),
         wall_s=time.time(),
         heard=heard,
-        inputs=_inputs(heard, action_source(loaded.robot)),
+        inputs=_inputs(heard, loaded.robot.mux.action_source),
         steps=_steps(heard["/rosout"], node.get_namespace()),
         servers=_servers(node),
         publishers={name: _endpoints(node.get_publishers_info_by_topic(name)) for name in names},

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from canbase_action_server.preconditions import action_source
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.outside import publishes_s
 from canbase_campaign.robots import commissioned
@@ -58,7 +57,7 @@ def simulated(robot: Robot) -> Simulated:
     """Raises UnfitError."""
     _check(robot)
     hands = _hands(robot)
-    own_action = action_source(robot)
+    own_action = robot.mux.action_source
     has_scanner = any(scan.required for scan in robot.safety.scans)
     without = set() if has_scanner else set(NO_SCANNER)
     without |= NO_LOCK if not _locks_all(robot) else set()
@@ -107,7 +106,7 @@ def _check(robot: Robot) -> None:
 
 def _hands(robot: Robot) -> tuple[str, ...]:
     """Names of the two sources with the highest priority that are not the action server."""
-    own_action = action_source(robot)
+    own_action = robot.mux.action_source
     others = [(source.priority, name) for name, source in robot.mux.sources.items() if name != own_action]
     return tuple(name for _, name in sorted(others, reverse=True))[: len(HANDS)]
 

@@ -10,7 +10,6 @@ from canbase_action_server.goal_queue import GoalQueue
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
 from canbase_action_server.outcome import Outcome
-from canbase_action_server.preconditions import action_source
 from canbase_campaign.clock import ComputerClock
 from canbase_campaign.process import Process, Topics
 from canbase_config.robot import Robot
@@ -45,7 +44,7 @@ class ActionProcess(Process):
     def __init__(self, robot: Robot, clock: ComputerClock, topics: Topics, on_end: Callable[[Goal], None]) -> None:
         super().__init__(clock)
         self._robot, self._topics, self._on_end = robot, topics, on_end
-        self._own_source = action_source(robot)
+        self._own_source = robot.mux.action_source
         self.on_order: Callable[[Twist], None] = lambda twist: None
         """Takes each command that it publishes."""
         self.goals: list[Goal] = []

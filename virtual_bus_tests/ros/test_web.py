@@ -149,6 +149,12 @@ def test_every_page_in_every_look_without_a_complaint_and_from_the_robot_alone(s
             page.wait_for_function(f"document.body.classList.contains('body--{scheme}')")
             assert page.evaluate("document.documentElement.scrollWidth") <= width, "no page is wider than the screen"
             picture(page, f"web_{PAGES[path].lower()}_{scheme}_{size}")
+        box = page.get_by_role("button", name="Stop the robot").bounding_box()
+        assert (box["x"] >= 0, box["x"] + box["width"] <= width) == (True, True), "STOP is inside the screen"
+        assert (box["y"] >= 0, box["y"] + box["height"] <= height) == (True, True)
+    for scheme in ("dark", "light", "dark"):  # the last: as the computer has it
+        page.get_by_role("button", name="Light or dark").click()
+        page.wait_for_function(f"document.body.classList.contains('body--{scheme}')")
     assert page.complaints == []
 
 

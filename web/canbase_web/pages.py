@@ -27,6 +27,8 @@ MENU: Final = (
     ("/stops", "Stops"),
     ("/health", "Health"),
 )
+NEXT_THEME: Final = {None: True, True: False, False: None}
+"""By the one of now: as the computer has it, dark, light."""
 STOP: Final = """
 <form class="stop-form" method="post" action="/stop">
   <button type="submit" aria-label="Stop the robot: ramp, power off, latched until a reset">STOP</button>
@@ -91,7 +93,8 @@ class Pages:
                         f'<a href="{each}"{here} style="color:inherit;padding:.5rem .7rem">{name}</a>', sanitize=False
                     )
             ui.space()
-            ui.button(icon="contrast", on_click=dark.toggle).props('flat color=white aria-label="Light or dark"')
+            theme = ui.button(icon="contrast", on_click=lambda: dark.set_value(NEXT_THEME[dark.value]))
+            theme.props('flat color=white aria-label="Light or dark"')
         ui.page_title(f"{title} · {robot}")
         with ui.column().classes("w-full q-pa-sm q-gutter-sm"):
             ui.html(

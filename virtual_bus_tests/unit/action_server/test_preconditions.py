@@ -7,7 +7,7 @@ import pytest
 
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Safety
-from canbase_action_server.preconditions import NO_SOURCE, action_source, state_reason
+from canbase_action_server.preconditions import NO_SOURCE, state_reason
 from canbase_config.mux import Mux, MuxSource
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.stop_cause import SCAN_LOST, StopCause
@@ -153,6 +153,6 @@ def test_old_messages_are_no_messages(name: str, topic: str, timeout_s: float) -
     ],
 )
 def test_where_the_mux_does_not_hear_the_action_server_every_goal_is_refused(source: MuxSource) -> None:
-    assert action_source(ROBOT) == "action"
+    assert ROBOT.mux.action_source == "action"
     robot = ROBOT.model_copy(update={"mux": Mux(sources={"only": source})})
     assert state_reason(robot, READY, 0.0) == NO_SOURCE

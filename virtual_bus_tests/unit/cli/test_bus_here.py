@@ -8,7 +8,7 @@ import pytest
 from can import VALID_INTERFACES
 from typer.testing import CliRunner
 
-from canbase_cli.bus_here import bus_warnings
+from canbase_cli.bus_here import bus_warnings, unknown_options
 from canbase_cli.main import app
 from canbase_config.load import sample
 from canbase_config.robot import Bus
@@ -58,6 +58,25 @@ def test_an_adapter_that_is_not_plugged_in_and_an_unknown_interface_are_named(ne
     (warning,) = warnings("socketcam", "can0", network)
     assert warning.startswith("bus.interface is 'socketcam', expected one of ")
     assert "socketcan" in warning
+
+
+def test_an_option_that_the_adapter_does_not_have_is_named_with_the_nearest() -> None:
+    bus = Bus(interface="udp_multicast", channel="239.74.163.2", extra={"prot": 5, "hop_limit": 0, "a": 1})
+    assert sorted(unknown_options(bus, {"port", "hop_limit"})) == [
+        "bus.extra.a is no option of python-can's udp_multicast: expected one of hop_limit, port",
+        "bus.extra.prot is no option of python-can's udp_multicast: did you mean port?",
+    ]
+
+
+@pytest.mark.parametrize(("interface", "told"), [("udp_multicast", "bus.extra.prot is no option"), ("socketcam", "")])
+def test_the_options_are_those_of_the_class_in_python_can(tmp_path: Path, interface: str, told: str) -> None:
+    file = tmp_path / "robot.yaml"
+    text = sample("bench").read_text().replace("interface: udp_multicast", f"interface: {interface}")
+    file.write_text(text.replace("hop_limit:", "prot: 3\n    hop_limit:"))
+    done = CliRunner().invoke(app, ["config", "check", str(file)])
+    assert done.exit_code == 0
+    assert ("bus.extra.prot" in done.stderr) is bool(told)
+    assert told in done.stderr
 
 
 def test_a_missing_channel_is_a_warning_and_quiet_prints_nothing(tmp_path: Path) -> None:
