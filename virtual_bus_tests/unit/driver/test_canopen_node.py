@@ -499,7 +499,7 @@ def test_a_refusal_of_the_units_is_an_answer_and_silence_is_none(silent: bool) -
     [
         ("60 0C 10 00 00 00 00 00", "is configured anew: another client has written its 100Ch:0"),
         ("60 16 10 01 00 00 00 00", ""),  # the boot sets it later
-        ("60 F9 60 01 00 00 00 00", ""),  # a gain
+        ("60 F9 60 01 00 00 00 00", "is configured anew: another client has written its 60F9h:1"),  # a gain
     ],
 )
 def test_what_another_client_writes_early_in_a_boot_counts_where_the_boot_does_not_set_it(
