@@ -17,6 +17,8 @@ Rules:
    of one would arm the joystick of the other: while the ROS graph has more than one there, it is disarmed. A lock with
    more than one publisher holds: a message of one does not release what another one holds. Nor does the zero of a
    publisher that has ended arm the one that comes after it, such as a joystick node that was started again.
+8. The nodes of a planner may share a topic. Those of two namespaces are of two robots, unless `nodes` has their full
+   names: their commands would come by turns. While there are such, none is followed, and no absence arms.
 """
 
 from __future__ import annotations
@@ -136,13 +138,13 @@ class _Source:
 
     def published_by(self, nodes: Sequence[str], keys: Sequence[str]) -> None:
         """Takes the publishers on its topic."""
-        if self.config.neutral_after_s is not None:
-            return
-        self.crowd = crowd(self.config.topic, nodes)
+        needs_zero = self.config.neutral_after_s is None
+        spaces = {node.rpartition("/")[0] for node in nodes if node and node not in self.config.nodes}
+        self.crowd = crowd(self.config.topic, nodes) if needs_zero or len(spaces) > 1 else ""
         before, self._publishers = self._publishers, frozenset(keys)
         if self.crowd:
             self.arming.disarm(self.crowd)
-        if before - self._publishers:
+        if needs_zero and before - self._publishers:
             self.arming.disarm(f"a publisher on {self.config.topic} has ended")
 
     @property
@@ -312,7 +314,8 @@ class Mux:
     def _arm(self, not_ready: str, now_s: float) -> None:
         for source in self._sources.values():
             paused = self._held_back(source, now_s) or self._without_scans
-            source.arming.look(not_ready, now_s, silent=not source.is_fresh(now_s), paused=paused)
+            silent = not source.is_fresh(now_s) and not source.crowd
+            source.arming.look(not_ready, now_s, silent=silent, paused=paused)
 
     def _others(self, now_s: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
         locks = tuple(lock.view(now_s) for lock in self._locks.values())

@@ -75,6 +75,42 @@ def test_many_nodes_of_a_planner_share_its_topic(story: Story) -> None:
     assert story.followed("navigation", 0.2)
 
 
+# two planners, of two robots, drive by turns ── one has ended ── silence arms the other one
+@pytest.mark.parametrize("gap_s", [0.1, 3.0])
+def test_the_planners_of_two_namespaces_are_not_followed_and_no_silence_arms_them(story: Story, gap_s: float) -> None:
+    both = ["/controller_server", "/robot2/controller_server", ""]
+    story.run(2.5)
+    assert story.followed("navigation", 0.2)
+    story.mux.on_publishers(PLANNER, both)
+    assert not story.followed("navigation", 0.5)
+    assert f"3 publishers on {PLANNER}" in story.decide().sources[1].reason
+    story.sends = {}
+    story.run(gap_s)
+    assert not story.followed("navigation", 0.5)
+    story.mux.on_publishers(PLANNER, both[:1])
+    assert not story.followed("navigation", 0.5)
+    story.sends = {}
+    story.run(2.5)
+    assert story.followed("navigation", 0.2)
+
+
+@pytest.mark.parametrize("name", DEFAULT_SOURCES)
+@pytest.mark.parametrize("second", ["/a", "/robot2/a"])
+def test_a_second_publisher_on_each_source_of_the_sample_robot(story: Story, name: str, second: str) -> None:
+    story.release(name)
+    assert story.followed(name, 0.2)
+    story.mux.on_publishers(DEFAULT_SOURCES[name].topic, ["/a", second])
+    assert story.followed(name, 0.2) is (name != "joystick" and second == "/a")
+
+
+def test_planners_of_two_namespaces_that_robot_yaml_names_are_followed() -> None:
+    planner = DEFAULT_SOURCES["navigation"].model_copy(update={"nodes": ("/nav/controller_server", "/dock/server")})
+    story = Story({**DEFAULT_SOURCES, "navigation": planner})
+    story.mux.on_publishers(PLANNER, [*planner.nodes, "/behavior_server"])
+    story.run(2.5)
+    assert story.followed("navigation", 0.2)
+
+
 def test_a_topic_that_is_no_source_and_no_lock_concerns_nobody(story: Story) -> None:
     story.release()
     story.mux.on_publishers("elsewhere", ["/a", "/b"])
