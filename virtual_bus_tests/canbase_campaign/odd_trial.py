@@ -24,14 +24,14 @@ from canbase_campaign.robots import campaign_robot
 from canbase_campaign.world import World
 from canbase_config.profile import Profile
 from canbase_config.robot import Robot
-from canbase_driver.causes import Cause
-from canbase_runtime.driver_state import DriverState
 from canbase_sim.odd.draw import OddDrive, draw
 
 DISTANCE_M, SPEED_MPS = 1.0, 0.4
 STARTS_S, SETTLES_S, LONGEST_GOAL_S, REST_S, LOOK_S = 40.0, 0.7, 15.0, 0.5, 0.05
 MOST_TRIES = 10
 """More messages than that one after the other: nobody has so much patience."""
+MISSING = "drive missing"
+"""The cause of a driver whose drives do not boot, as /diagnostics has it."""
 GOES_ON = "and goes on"
 """A boot that needs its time."""
 RESETS = 2
@@ -150,12 +150,11 @@ class _Start:
         end = clock.now_s + max(STARTS_S, self.world.robot.timeouts.boot_s + 2.0)
         while clock.now_s < end:
             clock.run_until(clock.now_s + LOOK_S)
-            state = driver.core.state
-            if state is DriverState.ENABLED:
+            if driver.enabled:
                 return True
-            if driver.core.finding.cause is Cause.DRIVE_MISSING and self._is_clear(read_advice(self._told())):
+            if driver.cause == MISSING and self._is_clear(read_advice(self._told())):
                 return False
-            if state is DriverState.LATCHED:
+            if driver.latched:
                 clock.run_until(clock.now_s + 1.0)
                 if read_advice(self._told()).keys or self.resets == RESETS:
                     return False
