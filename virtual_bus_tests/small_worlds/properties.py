@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass
 
 from canbase_campaign.envelope import Envelope, braking_s, moving_s, notice_s, react_s
-from canbase_campaign.judged_by import max_wheel_mps
+from canbase_campaign.judged_by import Bounds, max_wheel_mps
 from canbase_campaign.wishes import Wishes
 from canbase_hazards.stated_times import QUICK_STOP_S
 from canbase_sim.cia402.states import State
 from canbase_sim.node import SimulatedNode
 from canbase_velocity.twist import Twist
+from small_worlds.events import FAULT_EVENTS
 from small_worlds.world import SPEED_MPS, STEP_S, SmallWorld
 
 PROPERTIES = {
@@ -25,11 +26,13 @@ PROPERTIES = {
     "exception": "no core raises an exception",
     "runaway": "no wheel is faster than it was ordered to be for longer than the stated time",
 }
-HEARD_S = 0.1
-"""The button publishes at once that it is pressed."""
+FAULTS = frozenset(event.name for event in FAULT_EVENTS)
+HEARD_S = 2.0 * STEP_S
+"""The button publishes at once that it is pressed, and a filter that runs takes it in its next step."""
 OBEY_S = QUICK_STOP_S + 2.0 * STEP_S
 """A drive has braked by a quick stop after this: the first rung of docs/bus.md, and two steps."""
-RUNAWAY_MPS, RUNAWAY_S = 0.3, 0.5
+UNCHANGED = ("_small", "_world", "_lives", "_allowed")
+"""Of no memory: the world itself, and what is the same for ever."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +52,10 @@ class _Hold:
         self._since, self._stood = now_s, False
         self._tau_s = math.inf
 
-    def is_broken(self, tau_s: float, now_s: float, coasting: bool) -> bool:
-        """A base without force that slows down rolls out, from however fast it was: `runaway` bounds that."""
+    def is_broken(self, tau_s: float, now_s: float, coasting: bool, react_s: float) -> bool:
+        """`react_s`: what the faults of this moment leave to the layers. A base without force that slows down rolls
+        out, from however fast it was: `runaway` bounds that."""
+        self._envelope.react_s = react_s
         self._stood = self._stood or (tau_s == 0.0 and now_s >= self._since + OBEY_S)
         rolls_out, self._tau_s = coasting and tau_s < self._tau_s, tau_s
         beyond = tau_s > self._envelope.bound_s(tau_s, now_s, coasting)
@@ -63,7 +68,10 @@ class Properties:
     def __init__(self, small: SmallWorld) -> None:
         self._small, self._world = small, small.world
         robot, now_s = small.world.robot, small.world.clock.now_s
-        self._react_s = react_s(robot, layers=2)
+        self._one_s = self._react_s = react_s(robot, layers=1)
+        self._overlap_at = -math.inf
+        """When two faults held last."""
+        self._allowed = Bounds.of(robot)
         self._brakes_s = max(braking_s(robot, SPEED_MPS, 0.0), max_wheel_mps(robot) / robot.limits.deceleration_mps2)
         self._wishes = Wishes(robot, now_s - 10.0)
         self._fresh = Envelope(self._react_s + robot.safety.command_timeout_s, now_s)
@@ -86,7 +94,7 @@ class Properties:
     @property
     def memory(self) -> dict[str, object]:
         """What the properties remember: a part of a world's state."""
-        return {name: value for name, value in vars(self).items() if name not in ("_small", "_world", "_lives")}
+        return {name: value for name, value in vars(self).items() if name not in UNCHANGED}
 
     def _violate(self, name: str, detail: str) -> None:
         if self.found is None:
@@ -104,6 +112,7 @@ class Properties:
         base = world.drives.bench.base
         tau_s = moving_s(world.robot, base.v_mps, base.w_radps)
         coasting = tau_s > 0.0 and self._coasts()
+        self._note_faults(now_s)
         self._note_new_lives(now_s)
         self._note_latches(now_s)
         self._note_starts(now_s)
@@ -113,6 +122,13 @@ class Properties:
         self._check_cut_off(tau_s, now_s)
         self._check_runaway(now_s)
         world.clock.after(STEP_S, self._step)
+
+    def _note_faults(self, now_s: float) -> None:
+        """As the campaign's judge: a second layer has its time while two faults hold, and for one reaction after."""
+        holding = sum(name in FAULTS for _, name in self._small.ends)
+        self._overlap_at = now_s if holding > 1 else self._overlap_at
+        overlaps = now_s <= self._overlap_at + self._one_s
+        self._react_s = self._one_s + notice_s(self._world.robot) * overlaps
 
     def _cores(self) -> dict[str, object]:
         world = self._world
@@ -165,12 +181,13 @@ class Properties:
             self._neutral = _Hold(self._react_s, now_s)
 
     def _check_motion(self, tau_s: float, coasting: bool, now_s: float) -> None:
+        self._fresh.react_s = self._react_s + self._world.robot.safety.command_timeout_s
         self._fresh.order(self._wishes.greatest_s(now_s), now_s)
         if tau_s > self._fresh.bound_s(tau_s, now_s, coasting):
             self._violate("fresh", f"{self._speed()}, which is more than anybody orders")
-        if self._latched is not None and self._latched.is_broken(tau_s, now_s, coasting):
+        if self._latched is not None and self._latched.is_broken(tau_s, now_s, coasting, self._react_s):
             self._violate("latched", f"{self._speed()} while {' and '.join(sorted(self._latches))} latched")
-        if self._neutral is not None and self._neutral.is_broken(tau_s, now_s, coasting):
+        if self._neutral is not None and self._neutral.is_broken(tau_s, now_s, coasting, self._react_s):
             self._violate("neutral", f"{self._speed()}: the stick was held when it began, and never showed zero")
 
     def _check_power(self, now_s: float) -> None:
@@ -205,9 +222,9 @@ class Properties:
 
     def _check_runaway(self, now_s: float) -> None:
         wheel_mps = max(abs(axis.motor.speed_mps) for node in self._nodes() for axis in node.axes)
-        if wheel_mps <= SPEED_MPS + RUNAWAY_MPS or not self._powered():
+        if wheel_mps <= SPEED_MPS + self._allowed.runaway_mps or not self._powered():
             self._fast_since = now_s
-        elif now_s > self._fast_since + RUNAWAY_S:
+        elif now_s > self._fast_since + self._allowed.runaway_s:
             self._violate("runaway", f"a wheel turns at {wheel_mps:.2f} m/s, {SPEED_MPS} m/s was the most ordered")
 
     def _nodes(self) -> list[SimulatedNode]:

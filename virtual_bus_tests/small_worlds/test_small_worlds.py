@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from campaign.removed_safeguards import SAFEGUARDS
+from canbase_campaign.envelope import react_s
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State as WatchdogState
@@ -48,10 +49,23 @@ def test_ctrl_c_ends_a_search_with_what_was_found_until_then() -> None:
 
 def test_a_base_without_force_may_roll_out_and_never_get_faster() -> None:
     hold = _Hold(0.1, 10.0)
-    assert not hold.is_broken(2.0, 12.0, coasting=True)
-    assert not hold.is_broken(1.9, 12.2, coasting=True)
-    assert hold.is_broken(1.95, 12.4, coasting=True)
-    assert hold.is_broken(1.8, 12.6, coasting=False)
+    assert not hold.is_broken(2.0, 12.0, coasting=True, react_s=0.1)
+    assert not hold.is_broken(1.9, 12.2, coasting=True, react_s=0.1)
+    assert hold.is_broken(1.95, 12.4, coasting=True, react_s=0.1)
+    assert hold.is_broken(1.8, 12.6, coasting=False, react_s=0.1)
+
+
+def test_a_second_layer_has_its_time_only_while_two_faults_hold_and_one_reaction_after() -> None:
+    small = SmallWorld("driving")
+    properties, robot = Properties(small), small.world.robot
+    one_s, two_s = react_s(robot, layers=1), react_s(robot, layers=2)
+    allowed = []
+    for event in ("stick", "velocity hangs", "watchdog hangs"):
+        small.happens(EVENTS[event])
+        small.pass_to_point()
+        allowed.append(properties._react_s)
+    small.pass_to_point(EVENTS["watchdog hangs"].lasts_s + one_s)
+    assert [*allowed, properties._react_s] == [one_s, one_s, pytest.approx(two_s), one_s]
 
 
 def test_an_encoder_that_dies_as_the_emergency_stop_is_pressed_is_no_stand_and_the_next_order_finds_it() -> None:
