@@ -17,7 +17,7 @@ from canbase_action_server.outcome import ErrorCode
 from canbase_campaign.disk import StopDisk, WatchdogDisk
 from canbase_driver import core
 from canbase_driver.causes import Cause
-from canbase_driver.drives.let_go import LetGo
+from canbase_driver.drives.let_go import LetGo, Push
 from canbase_driver.motion import velocity_command as command
 from canbase_driver.motion.braking import Braking
 from canbase_driver.motion.kinematics import Twist2D
@@ -44,6 +44,7 @@ from canbase_watchdog.slowing import SlowingWatch
 from canbase_watchdog.standing import StandWatch
 from canbase_watchdog.stopper import Stopper
 from canbase_watchdog.trip_cause import FINE, TripCause
+from canbase_watchdog.unasked_torque import UnaskedTorque
 from canbase_watchdog.view import Axis
 from canbase_watchdog.watchdog import State, Watchdog
 
@@ -224,6 +225,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "ladder:slowing": _put(SlowingWatch, "fails", NEVER),
     "ladder:faulty_sensor": _put(Axis, "trusted", property(lambda self: True)),
     "ladder:sudden": _both(_put(StandWatch, "sudden", NEVER), _put(StandWatch, "unproven", NEVER)),
+    "watchdog:unasked_torque": _both(_put(UnaskedTorque, "is_due", NEVER), _put(UnaskedTorque, "is_dead", NEVER)),
     "watchdog:hard_braking": _put(HardBraking, "on_lease", lambda self, lease, now_s: None),
     "watchdog:lease_times": _put(lease, "judge", lambda new, last, timeout_s, now_s: None),
     "watchdog:lease_form": _put(lease, "parse", _any_lease),
@@ -268,6 +270,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:lock_publishers": _put(lock.Lock, "published_by", lambda self, nodes: None),
     "driver:lets_go": _put(LetGo, "_is_due", lambda self, wheels: False),
+    "driver:unasked_torque": _put(Push, "_note_change", lambda self, begins, elapsed_s: None),
     "mux:timeout": _put(mux._Source, "fresh", lambda self, now_s: self.command.within(1e9, now_s)),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),

@@ -91,6 +91,7 @@ NEEDS: tuple[Need, ...] = (
     Need("watchdog:vain", _NO_MOTION, _SENSORS.replace("watchdog:vain+", "")),
     Need("watchdog:strained", (*_NO_MOTION, "encoder_scaled"), _SENSORS.replace("watchdog:strained+", "")),
     Need("watchdog:behind", _SLOW, _SENSORS.replace("watchdog:behind+", "")),
+    Need("watchdog:unasked_torque", ("encoder_ghost",), "watchdog:ghost+driver:unasked_torque", quiet=True),
     # watchdog: rungs of ladder.RUNGS, and what climbs them
     Need("ladder:quick_stop", ("driver_repeats", *_VELOCITY_GONE, *_DRIVER_GONE),
          f"{_RUNGS}+drives:heartbeat_consumer"),
@@ -151,6 +152,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:odometry_jump_guard", ("frozen_encoder",), f"{_MOTION}+watchdog:motion_outside"),
     Need("driver:lets_go", ("encoder_lost", "stick_tapped"), f"watchdog:power_at_stand+{_MISSING}",
          quiet=True),
+    Need("driver:unasked_torque", ("encoder_ghost",), "watchdog:ghost+watchdog:unasked_torque", quiet=True),
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),
     Need("driver:switched_off", ("driver_switched_off_and_killed",)),
     Need("records:unreadable", ("driver_dies_torn", "watchdog_dies_torn", "lease_lost")),
