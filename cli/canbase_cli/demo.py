@@ -8,6 +8,7 @@ import random
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -24,7 +25,7 @@ from canbase_cli.goal import CANCELED, REJECTED
 from canbase_cli.options import ros_needed
 from canbase_cli.stack import Stack
 from canbase_runtime.own_modules import module_command
-from canbase_runtime.terminal import FAILED, fail
+from canbase_runtime.terminal import FAILED, fail, with_cursor
 
 if TYPE_CHECKING:
     from canbase_sim.control import SimControl
@@ -86,7 +87,7 @@ def demo(
 
     Exit codes: 0 every check passed, 1 otherwise.
     """
-    console = Console()
+    console = Console(file=with_cursor(sys.stdout))
     with tempfile.TemporaryDirectory(prefix="canbase-demo-") as folder, _environment() as env:
         with ros_needed():
             import rclpy  # noqa: F401 - fails here, with advice, rather than in five processes

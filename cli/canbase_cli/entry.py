@@ -7,10 +7,12 @@ import sys
 
 from canbase_cli.options import new_app
 from canbase_cli.services import SERVICES, add_services
+from canbase_runtime.terminal import filter_output
 
 
 def main() -> None:
     """The command line of this process, to its end."""
+    filter_output()
     # Plugins of pydantic would be code of others in each service, and are looked for in all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     if sys.argv[1:2] and sys.argv[1] in SERVICES:

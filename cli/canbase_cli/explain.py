@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, with_cursor
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
@@ -141,6 +141,6 @@ def _progress(recording: Path) -> Iterator[Progress | None]:
     from rich.console import Console
     from rich.progress import Progress as Bar
 
-    with Bar(console=Console(stderr=True), transient=True) as bar:
+    with Bar(console=Console(file=with_cursor(sys.stderr)), transient=True) as bar:
         task = bar.add_task(f"reading {recording.name}")
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -19,7 +20,7 @@ from canbase_action_server.feedback_watch import MAX_TIMEOUT_S
 from canbase_action_server.outcome import Status
 from canbase_cli.options import ROS_FLAG, RosCommand
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
-from canbase_runtime.terminal import FAILED, colour, fail
+from canbase_runtime.terminal import FAILED, colour, fail, with_cursor
 
 if TYPE_CHECKING:
     from canbase_action_server.goal_client import SentGoal
@@ -168,7 +169,7 @@ def _cancel(goal: SentGoal[Any], interrupts: Interrupts, unanswered: str = "") -
 @contextmanager
 def _shown(way: float, unit: str, quiet: bool) -> Iterator[Show]:
     """A progress bar on a terminal, a line per 10 % elsewhere, nothing when quiet."""
-    console = Console(stderr=True)
+    console = Console(file=with_cursor(sys.stderr))
     if quiet:
         yield lambda done, left: None
     elif console.is_terminal:

@@ -13,6 +13,7 @@ import typer
 from canbase_cli.end_signals import end_signals
 from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
 from canbase_runtime.foreign_text import clean
+from canbase_runtime.terminal import with_cursor
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -51,9 +52,10 @@ def _shown() -> Iterator[Callable[[Snapshot], None]]:
     from canbase_cli.monitor_picture import line, picture
 
     if sys.stdout.isatty():
+        from rich.console import Console
         from rich.live import Live
 
-        with Live(screen=True, auto_refresh=False) as live:
+        with Live(console=Console(file=with_cursor(sys.stdout)), screen=True, auto_refresh=False) as live:
             yield lambda snapshot: live.update(picture(snapshot), refresh=True)
         return
     before = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 import typer
 
 from canbase_cli.qualify_report import write, write_and_exit
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, with_cursor
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
@@ -270,7 +271,9 @@ class _Qualify:
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("runs"), TimeRemainingColumn())
         with (
             new_crew() as crew,
-            Progress(*columns, TextColumn("{task.fields[found]}"), console=Console(stderr=True)) as bar,
+            Progress(
+                *columns, TextColumn("{task.fields[found]}"), console=Console(file=with_cursor(sys.stderr))
+            ) as bar,
         ):
             done = len(results.done)
             task = bar.add_task("", total=done + sum(len(batch.seeds) for batch in todo), completed=done, found="")

@@ -14,7 +14,7 @@ import typer
 
 from canbase_cli.end_signals import end_signals
 from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, with_cursor
 
 if TYPE_CHECKING:
     from canbase_recording.mcap_file import McapFile
@@ -105,8 +105,9 @@ def _record_topics(
     if file.messages == 0:
         mcap.unlink()
         fail("no message came: is the robot up, and is ROS_DOMAIN_ID the same? ros2 topic list", FAILED)
-    end = "\r" if sys.stderr.isatty() else ""
-    typer.echo(f"{end}{mcap}: {file.messages} messages of {file.topics} topics, {file.size / 1e6:.1f} MB", err=True)
+    if sys.stderr.isatty():
+        with_cursor(sys.stderr).write("\r")
+    typer.echo(f"{mcap}: {file.messages} messages of {file.topics} topics, {file.size / 1e6:.1f} MB", err=True)
 
 
 def _record(file: McapFile, topics: list[str] | None, seconds: float | None, ended: list[int]) -> str:
@@ -140,5 +141,5 @@ def _record(file: McapFile, topics: list[str] | None, seconds: float | None, end
 def _progress(file: McapFile, elapsed_s: float) -> None:
     if sys.stderr.isatty():
         line = f"\r{elapsed_s:6.0f} s  {file.topics} topics  {file.messages} messages  {file.size / 1e6:.1f} MB"
-        sys.stderr.write(f"{line}\033[K")
-        sys.stderr.flush()
+        with_cursor(sys.stderr).write(f"{line}\033[K")
+        with_cursor(sys.stderr).flush()

@@ -1,13 +1,16 @@
-"""How a command ends when a person has to change something, and its colours.
+"""What a command prints: filtered, coloured; and how it ends when a person has to change something.
 
 Exit codes: 0 success, 1 it did not work out, 2 a wrong command line or robot.yaml. A command may add its own.
 """
 
 from __future__ import annotations
 
+import io
 import os
+import re
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn, TextIO
 
 import typer
 
@@ -18,6 +21,44 @@ FAILED: Final = 1
 """Exit code: the command was called correctly and did not succeed."""
 WRONG_INPUT: Final = 2
 """Exit code: the command line or robot.yaml has to be changed; typer uses it for the command line too."""
+_COLOURS: Final = "\x1b\\[[0-9;]*m"
+_CURSOR: Final = "\r|\x1b\\[[?0-9;]*[ABCDHJKhlm]"
+_CONTROLS: Final = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"
+"""All of Unicode's category Cc but line feed and tab, line and paragraph separators, and what turns the direction."""
+
+
+class Screen(io.TextIOWrapper):
+    """What a command prints. Names from DDS, files and CAN control no terminal, whichever command prints them: control
+    characters become \\u001b (so in JSON too), except those of `passes`, a regular expression."""
+
+    with_cursor: TextIO
+    """The same for a bar or a picture."""
+
+    def __init__(self, stream: TextIO, passes: str = _COLOURS) -> None:
+        lines = bool(stream.line_buffering)
+        super().__init__(stream.buffer, stream.encoding, "backslashreplace", line_buffering=lines)
+        self._stream = stream  # it would close the descriptor with its end
+        self._controls = re.compile(f"({passes})|{_CONTROLS}")
+
+    def write(self, text: str) -> int:
+        """As every stream. The length is that of `text`."""
+        super().write(self._controls.sub(lambda found: found[1] or f"\\u{ord(found[0]):04x}", text))
+        return len(text)
+
+
+def filter_output() -> None:
+    """For a whole process, at its start. A descriptor that was closed stays so."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is not None:
+            screen = Screen(stream)
+            screen.with_cursor = Screen(stream, _CURSOR)
+            setattr(sys, name, screen)
+
+
+def with_cursor(stream: TextIO) -> TextIO:
+    """For what moves the cursor: a progress bar, a picture. It shows nothing of others."""
+    return stream.with_cursor if isinstance(stream, Screen) else stream
 
 
 def load_config(path: Path | None, *, quiet: bool = False) -> Loaded:

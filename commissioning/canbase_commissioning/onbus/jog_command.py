@@ -24,7 +24,7 @@ from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
 from canbase_config.robot import Robot
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config, with_cursor
 
 SHOW_S: Final = 0.2
 CANNOT_STOP: Final = (
@@ -85,8 +85,8 @@ def _hold(line: BusSession, session: JogSession) -> None:
             session.press(text, now_s)
         if now_s - shown_at >= SHOW_S:
             shown_at = now_s
-            sys.stdout.write(f"\r{session.line:<78}")
-            sys.stdout.flush()
+            with_cursor(sys.stdout).write(f"\r{session.line:<78}")
+            with_cursor(sys.stdout).flush()
     sys.stdout.write("\n")
 
 

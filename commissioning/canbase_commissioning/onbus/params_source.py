@@ -22,7 +22,7 @@ from canbase_config.eds_file import Eds, EdsObject
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.sdo_block import BlockSdoClient
 from canbase_driver.cia301.sdo_client import SdoAborted, SdoTimeout
-from canbase_runtime.terminal import FAILED, fail
+from canbase_runtime.terminal import FAILED, fail, with_cursor
 
 T = TypeVar("T")
 ATTEMPTS: Final = 3
@@ -32,7 +32,9 @@ ATTEMPTS: Final = 3
 def bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
     """A progress bar on a terminal; elsewhere nothing is printed. Yields what takes the number that is done."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as shown:
+    with Bar(
+        *columns, console=Console(file=with_cursor(sys.stderr)), disable=not sys.stderr.isatty(), transient=True
+    ) as shown:
         task = shown.add_task(what, total=total)
         yield lambda done: shown.update(task, completed=done)
 

@@ -8,13 +8,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from canbase_commissioning.conversation import Progress as Step
+from canbase_runtime.terminal import with_cursor
 
 
 class Bar:
     """One bar that shows one step after the other. Use with `with`; `stop` takes it away for other output."""
 
     def __init__(self) -> None:
-        self._console = Console(file=sys.stderr)
+        self._console = Console(file=with_cursor(sys.stderr))
         self._progress: Progress | None = None
         self._task = TaskID(0)
         self._text = ""
