@@ -21,8 +21,9 @@ MOST_ENTRIES: Final = 500_000
 """More files than any environment has: half a minute on a slow disk. Beyond it the answer is no."""
 MOST_LINKS: Final = 40
 """In one path, as the kernel has it."""
-ACLS: Final = ("system.posix_acl_", "system.nfs4_acl")
-"""Extended attributes: lists of a file and default ones of a folder (acl(5)), and lists of NFSv4, CIFS and ZFS."""
+NFS4_ACL: Final = "system.nfs4_acl"
+ACLS: Final = ("system.posix_acl_", NFS4_ACL)
+"""Extended attributes: lists of a file and default ones of a folder (acl(5)); lists of NFSv4, which ZFS has too."""
 TOLD: Final = 3
 """So many faults are named; the cure of one is often that of all."""
 
@@ -33,8 +34,8 @@ class Fault:
 
     path: str
     why: str
-    by_acl: bool = False
-    """Owner and mode are right; an access control list gives more."""
+    acl: str = ""
+    """Owner and mode are right; an access control list of this name may give more."""
 
     @property
     def is_deep(self) -> bool:
@@ -42,9 +43,12 @@ class Fault:
         return self.path.count("/") > 1
 
     def cure(self) -> str:
-        """The command."""
+        """The command. NFSv4: a mount whose server has lists shows one for every file, `chmod` and nfs4_setfacl(1) only
+        replace it, and what it gives is for the server to say."""
         deep = "-R " if self.is_deep else ""
-        if self.by_acl:
+        if self.acl.startswith(NFS4_ACL):
+            return "install on a disk of this computer: no command removes the lists of NFSv4"
+        if self.acl:
             return f"sudo setfacl {deep}-b {self.path}"
         return f"sudo chown {deep}root:root {self.path} && sudo chmod {deep}go-w {self.path}"
 
@@ -65,13 +69,13 @@ def fault(found: os.stat_result, *, above: bool, trusted: frozenset[int] = ROOT_
     return ""
 
 
-def has_acl(path: str) -> bool:
-    """Whether it has an ACL, or passes one on to new files; a mode shows no more than its mask. Raises OSError."""
+def acl_of(path: str) -> str:
+    """The ACL that it has or passes on to new files, of which a mode shows the mask; empty: none. Raises OSError."""
     try:
-        return any(name.startswith(ACLS) for name in os.listxattr(path, follow_symlinks=False))
+        return next((name for name in os.listxattr(path, follow_symlinks=False) if name.startswith(ACLS)), "")
     except OSError as error:
         if error.errno in (errno.ENOTSUP, errno.ENOENT):  # a file system without any; gone meanwhile
-            return False
+            return ""
         raise
 
 
@@ -147,8 +151,8 @@ class _Walk:
             yield Fault(path, why)
             return
         try:
-            if has_acl(path):
-                yield Fault(path, "has an access control list", by_acl=True)
+            if acl := acl_of(path):
+                yield Fault(path, "has an access control list", acl)
         except OSError as error:
             yield Fault(path, f"cannot be looked at: {error.strerror}")
 

@@ -34,9 +34,11 @@ class Screen(io.TextIOWrapper):
     with_cursor: TextIO
     """The same for a bar or a picture."""
 
-    def __init__(self, stream: TextIO, passes: str = _COLOURS) -> None:
-        lines = bool(stream.line_buffering)
-        super().__init__(stream.buffer, stream.encoding, "backslashreplace", line_buffering=lines)
+    def __init__(self, stream: io.TextIOWrapper, passes: str = _COLOURS) -> None:
+        super().__init__(
+            stream.buffer, stream.encoding, "backslashreplace",
+            line_buffering=stream.line_buffering, write_through=stream.write_through,
+        )  # fmt: skip
         self._stream = stream  # it would close the descriptor with its end
         self._controls = re.compile(f"({passes})|{_CONTROLS}")
 
@@ -50,7 +52,7 @@ def filter_output() -> None:
     """For a whole process, at its start. A descriptor that was closed stays so."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None:
+        if isinstance(stream, io.TextIOWrapper):
             screen = Screen(stream)
             screen.with_cursor = Screen(stream, _CURSOR)
             setattr(sys, name, screen)

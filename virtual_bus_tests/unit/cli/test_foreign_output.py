@@ -52,7 +52,16 @@ def test_of_control_characters_only_those_of_canbase_pass(
         assert written.getvalue().decode() == expected
         assert sys.stderr is None
     assert json.loads(f'"{plain}"'.replace("\t", "").replace("\n", "").replace("\x1b", ""))
-    unfiltered = io.StringIO()
+
+
+def test_what_is_unbuffered_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PYTHONUNBUFFERED=1 of the services: a line is in the journal at once."""
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, "utf-8", write_through=True))
+    monkeypatch.setattr(sys, "stderr", unfiltered := io.StringIO())
+    terminal.filter_output()
+    print("at once")
+    assert written.getvalue() == b"at once\n"
     assert terminal.with_cursor(unfiltered) is unfiltered
 
 
