@@ -50,6 +50,9 @@ PATIENCE: Final = {
 }
 """`timeouts` of the demo: it shows the chain, and a laptop that is busy may not trip it. A robot keeps its defaults."""
 
+NEXT: Final = """Next: [bold]canbase up[/] starts a robot that keeps running.
+In another terminal: [bold]canbase drive 1.0[/], [bold]canbase monitor[/] or [bold]canbase web[/]. The first steps: docs/start.md"""
+
 
 @dataclass
 class Report:
@@ -105,13 +108,15 @@ def demo(
                 console.rule(part)
                 console.print(stack.log(part)[-3000:], markup=False, highlight=False)
             fail("a check of the demo failed", FAILED)
+    console.print(NEXT, highlight=False)
 
 
 def _show(console: Console, stack: Stack, config: Path, report: Report, speed_mps: float) -> None:
     from canbase_config.load import load_robot
     from canbase_sim.control import ControlError, SimControl, control_path
 
-    with console.status("starting: simulated drives, watchdog, velocity, driver, action server"):
+    parts = "simulated drives, watchdog, velocity, driver, action server"
+    with console.status(f"starting (up to {READY_S:.0f} s): {parts}"):
         observer = _Observer()
         started = time.monotonic()
         ready = observer.wait_enabled(READY_S, lambda: stack.death() is not None)
@@ -134,7 +139,8 @@ def _drive_one_metre(console: Console, observer: _Observer, sim: SimControl, rep
     while (code := _run(console, "drive", f"{DISTANCE_M}", "--speed", f"{speed_mps}")) == REJECTED:
         if time.monotonic() > deadline:
             break
-        console.print("[dim]not yet: its parts are still finding each other[/]")
+        left_s = deadline - time.monotonic()
+        console.print(f"[dim]Not yet: the processes are still finding each other. Trying for {left_s:.0f} s more.[/]")
         time.sleep(AGAIN_S)
     ended = time.monotonic()
     report.check("drive 1.0 succeeded", f"exit code {code}", code == 0)
