@@ -93,8 +93,8 @@ hazard-cases: $(WORLD_READY) ## the stated times of hazards on ROBOTS=20 drawn r
 	PYTHONPATH=$(WORLD) python -m campaign.hazard_cases $(if $(ROBOTS),--robots $(ROBOTS)) $(if $(FIRST),--first $(FIRST)) $(if $(ONLY),--only $(ONLY))
 
 .PHONY: worst
-worst: $(WORLD_READY) ## the worst speed, turn and load of failures that hide below a threshold: docs/stop_times.md; ONLY=encoder prints some
-	PYTHONPATH=$(WORLD) python -m campaign.worst $(if $(ONLY),--only '$(ONLY)',--write docs/stop_times.md)
+worst: $(WORLD_READY) ## the worst speed, turn and load of failures that hide below a threshold: docs/stop_times.md; ONLY=encoder prints some; ROWS=1 each stated time beside the worst found
+	PYTHONPATH=$(WORLD) python -m campaign.worst $(if $(ROWS),--rows) $(if $(ONLY),--only '$(ONLY)',--write docs/stop_times.md)
 
 .PHONY: stops
 stops: $(WORLD_READY) ## p50, p99 and max of each stop and each lie in virtual time: docs/stop_times.md; ONLY=encoder runs some

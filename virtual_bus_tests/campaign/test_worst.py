@@ -7,7 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from campaign.worst import COMMAND, LEAST_STEP, SEARCHED, Point, grid, runs, twins, worst
+from campaign.worst import (
+    COMMAND,
+    CORNERS,
+    LEAST_STEP,
+    ROWS_COMMAND,
+    SEARCHED,
+    Found,
+    Point,
+    grid,
+    latest,
+    rows_table,
+    runs,
+    stated_rows,
+    twins,
+    worst,
+)
 from support.marked_page import section
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
@@ -43,6 +58,27 @@ def test_the_page_has_the_worst_of_each_failure_that_is_searched() -> None:
     assert [row.split(" | ")[0][2:] for row in rows[1:]] == [f"{twin.what}: {twin.how}" for twin in twins("")]
     assert len(twins("")) == len(SEARCHED)
     assert not any("inf" in row or "nan" in row for row in rows)
+
+
+def test_the_page_has_each_stated_time_beside_the_worst_that_was_found() -> None:
+    """A new row with a failure that a driving base can have is missing on the page until it was searched."""
+    lines = section(PAGE.read_text(encoding="utf-8"), ROWS_COMMAND).splitlines()[2:]
+    on_page = [(line.split("](")[0].removeprefix("| ["), line.split(" | ")[1]) for line in lines]
+    assert on_page == stated_rows()
+
+
+def test_each_corner_is_one_that_the_robot_may_drive() -> None:
+    assert all(Point(*corner).is_possible for corner in CORNERS)
+
+
+def test_a_time_beyond_the_stated_one_is_marked() -> None:
+    name, point = "motor_driver: SIGKILL", Point(1.0, 0.0)
+    lines = [rows_table({("driver_killed_or_hung", name): Found(time_s, point)}) for time_s in (0.29, 0.31)]
+    assert ["**" in line for line in lines] == [False, True]
+
+
+def test_a_driver_that_is_killed_is_missed_in_the_stated_time() -> None:
+    assert 0.1 < latest("motor_driver: SIGKILL").value <= 0.3
 
 
 # just below the drop of a velocity that no wheel can do; and a loaded base on a curve, whose slower wheel is there

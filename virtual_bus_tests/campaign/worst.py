@@ -20,11 +20,14 @@ from typing import Final
 
 from rich.console import Console
 
-from canbase_campaign.cruise import Cruise, Run
+from canbase_campaign.cruise import JOYSTICK_S, Cruise, Run
 from canbase_campaign.robots import DrawnRobot, campaign_robot
-from canbase_campaign.twins import JOYSTICK, TWINS, Twin
+from canbase_campaign.twins import JOYSTICK, MEASURED, TWINS, Twin
 from canbase_config.robot import Robot
-from canbase_config.stopping import max_wheel_mps
+from canbase_config.stopping import longest_ramp_s, max_wheel_mps
+from canbase_hazards.catalogue import load
+from canbase_hazards.stated_times import stated_s
+from canbase_qualification.hazard_figures import faults_of
 from canbase_sim.plant.base import PlantParameters
 from support.marked_page import rewritten
 
@@ -33,6 +36,7 @@ with warnings.catch_warnings():
     import cma  # type: ignore[import-untyped]
 
 COMMAND: Final = "make worst"
+ROWS_COMMAND: Final = "make worst ROWS=1"
 SEARCHED: Final = (
     "encoder: lost",
     "encoder: frozen",
@@ -41,6 +45,10 @@ SEARCHED: Final = (
 """The failures that are searched, by the begin of their name: those whose time depends on a threshold of speed."""
 LINEAR, TURN, LOADS = (0.0, 0.15, 0.3, 0.6, 1.0), (-1.0, -0.5, 0.0, 0.5, 1.0), (1.0, 2.0)
 """The grid: shares of both limits, and multiples of the mass of the empty robot."""
+OF_GOALS: Final = ("drive_distance_server", "client", "odometry")
+"""A base that the joystick drives does not notice them."""
+CORNERS: Final = ((1.0, 0.0, 2.0), (0.125, 1.0, 2.0), (0.3, -0.5, 1.0))
+"""Of the rows: full speed and almost in place, with a load; and a slow curve, whose inner wheel is near standstill."""
 SIGMA, LEAST_STEP = 0.08, 1.0 / 64.0
 """Of the search, in shares of the limits: how far it looks at first, and how finely."""
 OPTIONS: Final = {
@@ -90,10 +98,11 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The greatest value, and where."""
+    """The greatest value, and where. `reported`: of a time, that a component reports the stop; else of standstill."""
 
     value: float
     point: Point
+    reported: bool = True
 
 
 def grid() -> list[Point]:
@@ -189,6 +198,41 @@ def _searched(name: str) -> dict[str, Found]:
     return searched(twin)
 
 
+def _driven() -> dict[str, Twin]:
+    """Failures of a base that the joystick drives, by name; those that only a goal knows are not among them."""
+    twins = (replace(twin, by=JOYSTICK) for twin in MEASURED if twin.what not in OF_GOALS)
+    return {": ".join(twin.key): twin for twin in twins}
+
+
+def stated_rows(only: str = "") -> list[tuple[str, str]]:
+    """Each row of hazards.yaml with a stated time, and each of its failures that a driving base can have here."""
+    failures, rows = _driven(), load().rows
+    pairs = ((row.id, name) for row in rows for name in faults_of(row) if row.within_s and name in failures)
+    return [(row, name) for row, name in pairs if only in f"{row} {name}"]
+
+
+def latest(name: str) -> Found:
+    """The longest time until a component reports that it stops the base, or the base stands, at the CORNERS."""
+    twin, points = _driven()[name], [Point(*corner) for corner in CORNERS]
+    runs_of = [(_cruise(point).fork(twin, seed=0), point) for point in points]
+    found = (Found(min(run.acts_s, run.time_s), point, math.isfinite(run.acts_s)) for run, point in runs_of)
+    return max(found, key=lambda each: each.value)
+
+
+def rows_table(found: dict[tuple[str, str], Found]) -> str:
+    """For the page: what the row states, and the worst that was found."""
+    lines = ["| row | failure | stated | worst found |", "|---|---|---|---|"]
+    for (row, name), worst_found in found.items():
+        row_s = stated_s(row, _robot()) + JOYSTICK_S * ("then zero" in name)
+        ramp_s = 0.0 if worst_found.reported else longest_ramp_s(_robot())
+        beyond = "**" if worst_found.value > row_s + ramp_s else ""
+        stands = "" if worst_found.reported or worst_found.value == math.inf else ", at standstill"
+        value = f"{worst_found.value:.2f} s" if worst_found.value < math.inf else "no stop"
+        cell = f"{beyond}{value}{beyond}{stands} at {worst_found.point}"
+        lines.append(f"| [{row}](safety.md#{row}) | {name} | {row_s:.2f} s | {cell} |")
+    return "\n".join(lines)
+
+
 def table(rows: dict[str, dict[str, Found]]) -> str:
     """For the page."""
     lines = [f"| failure | {' | '.join(MEASURES)} |", f"|---|{'---|' * len(MEASURES)}"]
@@ -202,10 +246,13 @@ def main() -> int:
     """Search; with --write put the table into a page, between its marks."""
     parser = argparse.ArgumentParser(prog="campaign.worst", description=__doc__)
     parser.add_argument("--only", default="", help="failures with this in their name")
+    parser.add_argument("--rows", action="store_true", help="all rows of hazards.yaml, at the corners alone")
     parser.add_argument("--write", type=Path, help="the page; not with --only")
     given = parser.parse_args()
     if given.only and given.write:
         parser.error("a page has all failures")
+    if given.rows:
+        return _rows(given.only, given.write)
     rows: dict[str, dict[str, Found]] = {}
     out = Console(soft_wrap=True, highlight=False, markup=False)
     names = [f"{twin.what}: {twin.how}" for twin in twins(given.only)]
@@ -217,6 +264,22 @@ def main() -> int:
         page = given.write.read_text(encoding="utf-8")
         given.write.write_text(rewritten(page, COMMAND, table(rows)), encoding="utf-8")
     return 0 if all(math.isfinite(found.value) for row in rows.values() for found in row.values()) else 1
+
+
+def _rows(only: str, page: Path | None) -> int:
+    pairs = stated_rows(only)
+    names = list(dict.fromkeys(name for _, name in pairs))
+    found: dict[str, Found] = {}
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        for name, each in zip(names, pool.imap(latest, names), strict=True):
+            found[name] = each
+            print(f"{name}: {each.value:.2f} s at {each.point}", flush=True)
+    text = rows_table({(row, name): found[name] for row, name in pairs})
+    if page is None:
+        print(text)
+    else:
+        page.write_text(rewritten(page.read_text(encoding="utf-8"), ROWS_COMMAND, text), encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
