@@ -101,6 +101,8 @@ def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
         if not private:
             with suppress(FileNotFoundError):
                 before = os.stat(path.name, dir_fd=folder)
+        if before and not stat.S_ISREG(before.st_mode):  # root would replace /dev/null
+            raise OSError(errno.EINVAL, f"{path} is no regular file")
         descriptor = os.open(new, _NEW, 0o600 if private or before else 0o666, dir_fd=folder)
         try:
             with open(path.with_name(new), "wb", opener=lambda *_: descriptor) as file:

@@ -286,6 +286,17 @@ def test_who_may_read_a_file_stays_and_a_link_is_not_followed(
     assert aim.exists() == (before is not None)
 
 
+@pytest.mark.parametrize("aim", ["/dev/null", "fifo", "."])
+def test_what_is_no_file_is_not_replaced(module: ModuleType, tmp_path: Path, aim: str) -> None:
+    """As /dev/stdout, which is a link to a terminal."""
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "link").symlink_to(aim)
+    for path in (tmp_path / "link", tmp_path / aim):
+        with pytest.raises(OSError, match="is no regular file"), module.replaced(path):
+            raise AssertionError
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["fifo", "link"]
+
+
 @pytest.mark.needs_root("give a file to another user")
 def test_a_file_of_another_user_stays_with_that_user(module: ModuleType, tmp_path: Path) -> None:
     """As robot.yaml of an integrator that `sudo canbase commission` changes."""
