@@ -50,8 +50,8 @@ PATIENCE: Final = {
 }
 """`timeouts` of the demo: it shows the chain, and a laptop that is busy may not trip it. A robot keeps its defaults."""
 
-NEXT: Final = """Next: [bold]canbase up[/] starts a robot that keeps running.
-In another terminal: [bold]canbase drive 1.0[/], [bold]canbase monitor[/] or [bold]canbase web[/]. The first steps: docs/start.md"""
+NEXT: Final = """Next: `canbase up` starts a robot that keeps running.
+In another terminal: `canbase drive 1.0`, `canbase monitor`, `canbase web`. First steps: docs/start.md"""
 
 
 @dataclass
