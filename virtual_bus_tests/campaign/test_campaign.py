@@ -65,7 +65,7 @@ def test_every_row_of_the_teeth_names_safeguards_and_faults_that_exist() -> None
     assert sorted(need.safeguard for need in NEEDS) == sorted(SAFEGUARDS), "one row each"
 
 
-OPEN = 40
+OPEN = 38
 """So many rows have no scenario yet that needs them. The number may only fall."""
 
 
