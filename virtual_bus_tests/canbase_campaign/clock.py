@@ -107,11 +107,13 @@ class ComputerClock:
         self.at(self.now_s + delay_s, do, *arguments)
 
     def suspend(self) -> None:
-        """Until `resume`."""
-        self._suspended_at = self._world.now_s
+        """Until `resume`. A computer that is suspended already goes on so."""
+        self._suspended_at = min(self._suspended_at, self._world.now_s)
 
     def resume(self) -> None:
-        """It runs again."""
+        """It runs again, or goes on running."""
+        if not self.is_suspended:
+            return
         self.suspended_s += self._world.now_s - self._suspended_at
         self._suspended_at = math.inf
         timers, self._timers = self._timers, []

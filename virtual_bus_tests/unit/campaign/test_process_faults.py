@@ -101,6 +101,17 @@ def test_the_clock_of_a_suspended_computer_does_not_run_and_its_timers_wait() ->
     assert calls == [(101.5, 161.5)]
 
 
+def test_two_suspends_that_overlap_are_one() -> None:
+    world = Clock(100.0)
+    computer = ComputerClock(world)
+    for at_s, do in ((101.0, computer.suspend), (102.0, computer.suspend), (103.0, computer.resume)):
+        world.run_until(at_s)
+        do()
+    world.run_until(104.0)
+    computer.resume()
+    assert (computer.now_s, computer.suspended_s) == (102.0, 2.0)
+
+
 # driving, and the joystick is held ── suspended ── no age shows the pause, and no wheel moves again
 @pytest.mark.parametrize(("lasts_s", "without"), [(0.2, ""), (60.0, ""), (0.2, "watchdog"), (0.2, "driver")])
 def test_a_base_whose_computer_was_suspended_stands_until_a_reset(lasts_s: float, without: str) -> None:
