@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from canbase_runtime.web_names import hosts
@@ -53,6 +55,37 @@ def test_the_pages_of_two_robots_in_one_browser_have_cookies_of_their_own() -> N
     cookies = f"{NAME}={SESSION}; {other.cookie}={other.session}"
     assert judged(MINE | {"cookie": cookies}) is Verdict.PASSES
     assert judged({"host": "127.0.0.1:8081", "cookie": cookies}, access=other) is Verdict.PASSES
+
+
+@pytest.mark.parametrize(
+    ("line", "headers"),
+    [
+        ("POST /stop", "Cookie: " + "a=b; " * 3200),
+        ("POST /stop", 'Cookie: a="' + "\\101" * 4000),
+        ("GET /?" + "a=1&" * 4000, ""),
+        ("GET /", "".join(f"h{number}:\r\n" for number in range(2000))),
+    ],
+)
+def test_a_long_head_is_refused_as_fast_as_a_short_one(line: str, headers: str) -> None:
+    """One thread refuses all: 200 a second would hold up STOP. In calls, which no load of this computer changes."""
+
+    def calls(head: str) -> int:
+        count = 0
+
+        def counted(*_: object) -> None:
+            nonlocal count
+            count += 1
+
+        sys.setprofile(counted)
+        try:
+            request = parsed(head.encode())
+            verdict = Verdict.MALFORMED if request is None else ACCESS.judge(request)
+        finally:
+            sys.setprofile(None)
+        assert verdict in (Verdict.MALFORMED, Verdict.NO_TOKEN)
+        return count
+
+    assert calls(f"{line} HTTP/1.1\r\nHost: 127.0.0.1:8080\r\n{headers}") < 1000
 
 
 def test_without_a_host_there_is_no_access() -> None:
