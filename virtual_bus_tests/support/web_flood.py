@@ -23,6 +23,7 @@ FLOODS: Final = {
     "silent connections": ("", 3000),
     "silent heads": (f"GET / HTTP/1.1\r\n{HOST}X-", 3000),
     "refused posts without their body": (f"POST /stop HTTP/1.1\r\n{HOST}Content-Length: 1000\r\n\r\n", 300),
+    "long cookies": (f"POST /stop HTTP/1.1\r\n{HOST}Cookie: {'a=b; ' * 3200}\r\n\r\n", 300),
     "websocket handshakes": (HANDSHAKE, 300),
     "1500 handshakes at once": (HANDSHAKE, 1500),
 }
