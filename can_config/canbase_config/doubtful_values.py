@@ -13,13 +13,6 @@ if TYPE_CHECKING:
 
 def doubtful_values(robot: Robot) -> Iterator[tuple[Loc, str]]:
     """The place of each in robot.yaml, and a sentence."""
-    radius_m, track_m = robot.base.wheel_radius_m, robot.base.track_m
-    if radius_m > track_m:
-        yield (
-            ("base", "wheel_radius_m"),
-            f"the radius of a wheel ({radius_m:g} m) is larger than the distance between the wheels (track_m: "
-            f"{track_m:g} m); measure both in metres",
-        )
     pairs = (("max_speed_mps", "linear_mps", "m/s"), ("max_speed_radps", "angular_radps", "rad/s"))
     for own, limit, unit in pairs:
         most, allowed = getattr(robot.action, own), getattr(robot.limits, limit)

@@ -21,15 +21,6 @@ def warnings(folder: Path, old: str, new: str) -> dict[str, str]:
     return {each.key: each.what for each in load_robot(file).warnings}
 
 
-@pytest.mark.parametrize(("radius", "is_told"), [("0.501", True), ("0.5", False), ("0.1", False)])
-def test_a_wheel_that_is_larger_than_the_track_is_wide(tmp_path: Path, radius: str, is_told: bool) -> None:
-    told = warnings(tmp_path, "wheel_radius_m: 0.1", f"wheel_radius_m: {radius}")
-    assert ("base.wheel_radius_m" in told) is is_told
-    assert not is_told or "(0.501 m) is larger than the distance between the wheels (track_m: 0.5 m)" in " ".join(
-        told.values()
-    )
-
-
 @pytest.mark.parametrize(
     ("key", "value", "is_told"),
     [
