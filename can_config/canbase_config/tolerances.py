@@ -56,7 +56,8 @@ class Bound:
         """The formula, or the default where that forgives more."""
         section, name = self.key.split(".")
         default = type(getattr(robot, section)).model_fields[name].default
-        return self.formula(robot) if default is None else max(float(default), self.formula(robot))
+        forgives = min if self.is_least else max
+        return self.formula(robot) if default is None else forgives(float(default), self.formula(robot))
 
     def holds(self, robot: Robot) -> bool:
         """Whether the value is within its bound."""
@@ -161,7 +162,7 @@ BY_RANGE: Final = {
     "watchdog.overspeed_factor": "a multiple of the speed itself; its range ends at one and a half",
     "watchdog.travel_tolerance_m": "its range ends at a quarter of the travel within which it is forgotten, 0.25 m",
     "watchdog.feedback_samples": "its range ends at 0.1 s at 100 Hz, as long as timeouts.feedback_s by default",
-    "watchdog.loop_late_s": "at most two thirds of timeouts.drive_heartbeat_s, above",
+    "watchdog.loop_late_s": "at most two thirds of timeouts.drive_heartbeat_s, a row of the table of reserves",
     "watchdog.stand_proof": "one of two words; none has a warning",
     "watchdog.relay": "a GPIO line, no tolerance",
 }

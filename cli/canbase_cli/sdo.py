@@ -101,11 +101,10 @@ def write(
 ) -> None:
     """Write one object, and read it back.
 
-    Refused while a motor of this node has power, and while canbase's driver runs on this bus: the driver undoes a write
-    to what decides how a drive stops (PDOs, ramps, 1016h, 6007h …), compares units, scale and polarity with `expects`
-    in robot.yaml, and does not notice a write to another setting. The watchdog stops the robot when another master
-    writes those, controlword, mode or target under power. With --eds, a read-only object and a value out of range are
-    refused before anything is sent; --force does not change that.
+    Refused while a motor of this node has power, and while canbase's driver runs on this bus: after each write of
+    another client the driver boots the drive anew, as soon as no motor of it has power, and the watchdog stops the
+    robot if one has. With --eds, a read-only object and a value out of range are refused before anything is sent;
+    --force does not change that.
 
     Exit codes: 0 written and read back, 1 refused or no answer, 2 wrong command line, value or robot.yaml.
     """

@@ -9,7 +9,6 @@ from canbase_commissioning.object_dictionary import Address, encode, statuswords
 from canbase_config.object_map import (
     AXIS_OFFSET,
     CONTROLWORD,
-    MODE,
     STATUSWORD,
     TARGET_VELOCITY,
     VL_TARGET_VELOCITY,
@@ -21,7 +20,7 @@ from canbase_driver.cia301.sdo_client import WRITE_ONLY, Read, SdoAborted, Write
 from canbase_driver.cia402 import decode_statusword
 from canbase_driver.drives.foreign_writes import is_of_scale
 
-COMMANDS: Final = frozenset((CONTROLWORD, MODE, TARGET_VELOCITY, VL_TARGET_VELOCITY))
+COMMANDS: Final = frozenset((CONTROLWORD, TARGET_VELOCITY, VL_TARGET_VELOCITY))
 """What the driver orders in each cycle; of the first axis."""
 
 

@@ -2,10 +2,11 @@
 
 Rules:
 1. A place counts as free only where the newest scan of a fresh scanner covers it (`Field.covers`). Nothing that was not
-   received makes a place free: neither a share of beams, nor another scanner beside.
+   received makes a place free: neither a share of beams, nor covered places beside it. The outcome of a place that is
+   not covered is a stop, or at most blind_mps (safety_filter.py).
 2. What a scanner looked at with its first scan, and does not look at any more, is not covered, though another scanner
-   covers it: the one that is lost may have seen what that one cannot. So it is for a scanner whose scans do not count
-   any more, and for one whose field has become narrower, shorter or coarser.
+   covers it: the first scanner may have seen what the other one cannot. This holds for a scanner whose scans do not
+   count any more, and for one whose field has become narrower, shorter or coarser.
 3. Places within GAP_M of where the footprint is need no cover: no leg is hidden there.
 4. A limit zone of which a place is not covered counts as occupied.
 """
@@ -26,8 +27,9 @@ from canbase_velocity.sweep import Bools, Box, Floats
 from canbase_velocity.twist import Twist
 
 EDGE_M = 0.05
-"""The places on the edge of the footprint are so far apart at most [m]: a gap of 0.11 m is never missed."""
+"""The places on the edge of the footprint are so far apart at most [m], so a gap of 0.11 m (EDGE_M + 2 GAP_M) is never missed."""
 MOST_PER_SIDE = 40
+"""On a side that is longer than 2 m they are farther apart."""
 ZONE_PLACES = 12
 """Rule 4 looks at so many places along each side of a zone."""
 

@@ -220,9 +220,9 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
 
 
 def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
-    """Of rule 4: where no scanner covers the path. Before any scan it does not apply."""
+    """Of rule 4: where no scanner covers the path. Before any scan has arrived it does not apply."""
     command, sight, geometry = inputs.command, inputs.sight, config.geometry
-    if all(scan.age_s == math.inf for scan in inputs.scans):
+    if all(scan.age_s == math.inf and not scan.dropped for scan in inputs.scans):
         return []
     found, slower = [], command
     if sight.fields:
@@ -240,7 +240,7 @@ def _not_covered(gap: Gap, inputs: Inputs, config: FilterConfig) -> Finding:
         why = f"{gap.share:.0%} of the path are covered: {topics} looks at the rest, and has no readings there"
         return _blind(command, StopCause.SCAN_BLIND, why, "usable readings, or another direction", config)
     if not any(scan.is_fresh for scan in inputs.scans):
-        why, cure = "the scans of every scanner have ended", "scans that can be used"
+        why, cure = "no scanner has scans that count", "scans that can be used"
     elif gap.why is Why.LOST:
         why = f"{topics} looked where the command leads, and does not any more"
         cure = f"scans on {topics} as its first one was; after a change of the scanner: a new start of canbase"

@@ -92,17 +92,18 @@ def open_own_folder(path: Path, mode: int | None = None) -> int:
 def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
     """A file to write. At the end of the block it is on disk (fsync) and takes the place of `path`, file or link.
 
-    Where anything raises, `path` is as it was and nothing is left beside it. `private`: for this user alone; otherwise
-    with the mode, owner and group of the one before. Raises OSError.
+    Where anything raises before that, `path` is as it was and nothing is left beside it. `private`: for this user alone;
+    otherwise with the mode, owner and group of the one before. Does not judge the folder: `open_own_folder` does.
+    Raises OSError, also where `path` is no regular file.
     """
     folder, new = os.open(path.parent, os.O_DIRECTORY | os.O_CLOEXEC), f".{path.name}.{os.urandom(4).hex()}"
     before = None
     try:
-        if not private:
-            with suppress(FileNotFoundError):
-                before = os.stat(path.name, dir_fd=folder)
+        with suppress(FileNotFoundError):
+            before = os.stat(path.name, dir_fd=folder)
         if before and not stat.S_ISREG(before.st_mode):  # root would replace /dev/null
             raise OSError(errno.EINVAL, f"{path} is no regular file")
+        before = None if private else before
         descriptor = os.open(new, _NEW, 0o600 if private or before else 0o666, dir_fd=folder)
         try:
             with open(path.with_name(new), "wb", opener=lambda *_: descriptor) as file:

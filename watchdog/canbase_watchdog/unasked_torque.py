@@ -2,12 +2,13 @@
 
 A drive changes the torque that holds a wheel because it saw the wheel move. One whose encoder did not count works
 against a motion that does not exist: its velocity loop integrates an error that 606Ch need not even show. It must
-release the wheel. Where it does so again before the encoder has counted, the sensor is dead.
+release the wheel. Where it does so again before the encoder has counted, the sensor is dead. Any loss of power ends a
+period, whoever caused it, and half of the limit counts: the driver releases the wheel before all of it is reached.
 
     holds ──the torque differs──► due: the driver releases ──differs again, no count between──► dead
 
 What holds the wheel is the torque SETTLES_S after the last count or the last release, and never more than HELD_SHARE:
-slopes take no more, and what a dead encoder winds up is not learned. Only increments count, one at an edge apart: a
+slopes take no more, and what a dead encoder winds up is not learned. One increment to and fro at an edge is no count: a
 dead encoder that jitters by more is not found by this rule.
 """
 

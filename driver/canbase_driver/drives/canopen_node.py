@@ -399,7 +399,8 @@ class CanopenNode:
         return True
 
     def on_sdo(self, frame: Frame, now_s: float) -> bool:
-        """Take an SDO answer; one without a request of ours is another client's (a tool's) and fine."""
+        """Take an SDO answer. One without a request of ours is another client's, such as a tool's: where it confirms a
+        write, the node is booted anew once it has no power."""
         self._signs.on_sdo(frame, now_s)
         if self._boot is not None:
             self._in_boot.take(frame, self._boot)

@@ -35,7 +35,10 @@ def is_of_scale(index: int, drives: Sequence[Drive] = ()) -> bool:
 
 
 def foreign_write(frame: Frame) -> str:
-    """The object that this SDO answer, to no request of ours, shows as written, like "1016h:1"; empty: none."""
+    """The object that this SDO answer shows as written, like "1016h:1"; empty: none.
+
+    The caller knows that it answers no request of ours: outside of a boot the driver writes `_COMMANDED` alone.
+    """
     data = frame.data
     if len(data) != 8 or (data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK):
         return ""

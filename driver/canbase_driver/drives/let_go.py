@@ -8,7 +8,7 @@ and is held again; one that friction holds does not notice (docs/decisions/0041)
 The same holds where the torque changes later, with nothing ordered, and the encoder does not count: the drive works
 against a motion that does not exist (docs/decisions/0123). Where the release does not end that, the watchdog trips.
 
-    HELD ──pushed for stand_impulse_s──► LETTING GO ──no axis has torque──► RETURNING ──all enabled──► HELD
+    HELD ──an axis must (axis.py)──► LETTING GO ──no axis has torque──► RETURNING ──all enabled──► HELD
 """
 
 from __future__ import annotations

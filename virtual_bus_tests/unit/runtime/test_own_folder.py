@@ -286,13 +286,14 @@ def test_who_may_read_a_file_stays_and_a_link_is_not_followed(
     assert aim.exists() == (before is not None)
 
 
+@pytest.mark.parametrize("private", [False, True])
 @pytest.mark.parametrize("aim", ["/dev/null", "fifo", "."])
-def test_what_is_no_file_is_not_replaced(module: ModuleType, tmp_path: Path, aim: str) -> None:
+def test_what_is_no_file_is_not_replaced(module: ModuleType, tmp_path: Path, aim: str, *, private: bool) -> None:
     """As /dev/stdout, which is a link to a terminal."""
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "link").symlink_to(aim)
     for path in (tmp_path / "link", tmp_path / aim):
-        with pytest.raises(OSError, match="is no regular file"), module.replaced(path):
+        with pytest.raises(OSError, match="is no regular file"), module.replaced(path, private=private):
             raise AssertionError
     assert sorted(each.name for each in tmp_path.iterdir()) == ["fifo", "link"]
 

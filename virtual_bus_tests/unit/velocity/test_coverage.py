@@ -116,6 +116,14 @@ def test_an_optional_scanner_that_never_came_is_not_missed() -> None:
     assert Two().after(AHEAD, ALL).twist == AHEAD
 
 
+def test_an_optional_scanner_of_which_no_scan_ever_counted_makes_nothing_free() -> None:
+    two = Two(scan={"required": False})
+    assert two.after(AHEAD, None).twist == AHEAD
+    blind = two.after(AHEAD, None, dataclasses.replace(ALL, ranges_m=np.full(360, NAN)))
+    assert (blind.cause, speed(blind)) == (StopCause.BLIND, pytest.approx(0.15))
+    assert "no scanner has scans that count" in blind.detail
+
+
 @pytest.mark.parametrize(
     ("later", "is_free"),
     [
