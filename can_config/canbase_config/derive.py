@@ -8,6 +8,7 @@ from canbase_config.drive import Drive
 from canbase_config.profile import Profile
 from canbase_config.robot import Robot
 from canbase_config.stopping import (
+    BRAKING_SHARE,
     SLOPE_S,
     SLOPE_SHARE,
     coasting_s,
@@ -15,7 +16,6 @@ from canbase_config.stopping import (
     hardest_braking_mps2,
     hardest_stop_mps2,
     jerk_adds_s,
-    least_braking_mps2,
     max_wheel_mps,
     order_wait_s,
     slowest_ramp_mps2,
@@ -91,7 +91,7 @@ def watchdog_config(robot: Robot) -> WatchdogConfig:
         braking_samples=samples(robot, BRAKING_SAMPLES),
         overspeed_factor=watchdog.overspeed_factor,
         travel_tolerance_m=watchdog.travel_tolerance_m,
-        braking_mps2=least_braking_mps2(robot),
+        braking_mps2=BRAKING_SHARE * limits.deceleration_mps2,
         coasting_s=coasting_s(watchdog.overspeed_factor * max_wheel_mps(robot)),
         motion_missing_s=watchdog.motion_missing_s,
         motion_missing_m=watchdog.motion_missing_m,

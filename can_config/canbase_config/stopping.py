@@ -177,26 +177,10 @@ def hardest_stop_mps2(robot: Robot) -> float:
 
 def hardest_braking_mps2(robot: Robot, drive: Drive) -> float:
     """With power its drive brakes it no harder [m/s²]: by 6085h where that is known."""
-    if not _brakes_by_6085h(drive):
+    kind = drive.kind
+    if kind.options.ramps == "no" or kind.is_unproven("options.ramps") or kind.is_unproven("units.acceleration"):
         return hardest_stop_mps2(robot)
     return HARDEST_SHARE * robot.limits.emergency_deceleration_mps2
-
-
-def least_braking_mps2(robot: Robot) -> float:
-    """In a quick stop a wheel with power loses at least this, over the whole stop [m/s²].
-
-    Half of the ordinary deceleration, and a quarter of 6085h where all drives are known to brake by it: what brakes
-    so much less than it has confirmed is faulty, and gets the next rung of the ladder.
-    """
-    limits, known = robot.limits, all(_brakes_by_6085h(drive) for drive in robot.drives)
-    least_mps2 = BRAKING_SHARE * limits.deceleration_mps2
-    return max(least_mps2, SLOPE_SHARE * limits.emergency_deceleration_mps2) if known else least_mps2
-
-
-def _brakes_by_6085h(drive: Drive) -> bool:
-    kind = drive.kind
-    unproven = kind.is_unproven("options.ramps") or kind.is_unproven("units.acceleration")
-    return kind.options.ramps != "no" and not unproven
 
 
 def slowest_ramp_mps2(robot: Robot) -> float:

@@ -28,11 +28,11 @@ def bus_warnings(bus: Bus, interfaces: Collection[str], network: Path = SYSFS) -
 
 
 def unknown_options(bus: Bus, parameters: Collection[str]) -> Iterator[str]:
-    """Keys of bus.extra that the adapter's class in python-can, with these parameters, has no use for."""
+    """Keys of bus.extra that are nearly one of these parameters of the adapter's class in python-can. Many classes take
+    options that their signature does not name."""
     for key in bus.extra.keys() - set(parameters):
-        near = difflib.get_close_matches(key, parameters, n=1)
-        instead = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(sorted(parameters))}"
-        yield f"bus.extra.{key} is no option of python-can's {bus.interface}: {instead}"
+        for near in difflib.get_close_matches(key, parameters, n=1):
+            yield f"bus.extra.{key} is no option of python-can's {bus.interface}: did you mean {near}?"
 
 
 def _socketcan(bus: Bus, network: Path) -> Iterator[str]:

@@ -48,7 +48,9 @@ PATIENCE: Final = {
     "watchdog_s": 0.5,
     "odometry_s": 1.0,
 }
-"""`timeouts` of the demo: it shows the chain, and a laptop that is busy may not trip it. A robot keeps its defaults."""
+LOOP_LATE_S: Final = 0.5
+"""`timeouts` and `watchdog.loop_late_s` of the demo: it shows the chain, and a laptop that is busy may not trip it. A
+robot keeps its defaults."""
 
 NEXT: Final = """Next: `canbase up` starts a robot that keeps running.
 In another terminal: `canbase drive 1.0`, `canbase monitor`, `canbase web`. First steps: docs/start.md"""
@@ -106,7 +108,7 @@ def demo(
         if not report.good:
             for part in codes:
                 console.rule(part)
-                console.print(stack.log(part)[-3000:], markup=False, highlight=False)
+                typer.echo(stack.log(part)[-3000:])
             fail("a check of the demo failed", FAILED)
     console.print(NEXT, highlight=False)
 
@@ -306,6 +308,7 @@ def _robot_file(folder: Path) -> Path:
         values["bus"]["extra"]["port"] = free.getsockname()[1]
     values["lease"]["socket"] = str(folder / "lease.sock")
     values["timeouts"] = values.get("timeouts", {}) | PATIENCE
+    values["watchdog"] = values.get("watchdog", {}) | {"loop_late_s": LOOP_LATE_S}
     values["safety"]["command_timeout_s"] = PATIENCE["command_s"]
     path = folder / "robot.yaml"
     yaml.dump(values, path)

@@ -167,7 +167,9 @@ class DriverCore:
         self._bus_problem = problem
 
     def on_suspend(self, now_s: float) -> None:
-        """The computer was suspended, which no age contains: nothing received counts, and every node boots again."""
+        """The computer was suspended, which no age contains: nothing received counts, every node boots again, and a
+        reset on its way is broken off."""
+        self._reset.end(Outcome(False, "broken off: the computer was suspended; reset again"))
         self._lose_all("was not supervised while the computer was suspended", now_s)
 
     def _lose_all(self, why: str, now_s: float) -> None:

@@ -27,7 +27,7 @@ from canbase_velocity.sweep import Bools, Box, Floats
 from canbase_velocity.twist import Twist
 
 EDGE_M = 0.05
-"""The places on the edge of the footprint are so far apart at most [m], so a gap of 0.11 m (EDGE_M + 2 GAP_M) is never missed."""
+"""The places on the edge of the footprint are so far apart at most [m]: a gap of 0.11 m, EDGE_M + 2 GAP_M, is seen."""
 MOST_PER_SIDE = 40
 """On a side that is longer than 2 m they are farther apart."""
 ZONE_PLACES = 12

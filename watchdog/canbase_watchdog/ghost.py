@@ -1,4 +1,4 @@
-"""A ghost: the velocity shows that a wheel turns, one way, and its encoder does not move. Judged here; cause 12 in policy.py.
+"""A ghost: the velocity shows that a wheel turns, one way, and its encoder does not move. Cause 12 in policy.py.
 
 Its drive works against a motion that does not exist, also with nothing ordered: the velocity loop integrates what
 606Ch shows, and the wheel accelerates behind an encoder that is frozen. The rule holds at two scales (decision 123):
@@ -9,7 +9,8 @@ Its drive works against a motion that does not exist, also with nothing ordered:
 | jitters | a sign of life, 1 mm | two signs of life |
 
 LEAST_S after the encoder last moved it begins to count, and it must last for LEAST_S more: 606Ch may be filtered, and a
-wheel may meet something hard. A register that shows a few bits at standstill is no ghost, nor is a velocity that falls or changes its sign.
+wheel may meet something hard. A register that shows a few bits at standstill is no ghost, nor is a velocity that falls
+or changes its sign.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from canbase_watchdog.counts import LIFE_COUNTS, Life, life_m
 LIVES = 2.0
 FROZEN_M, FROZEN_COUNTS = 0.0001, 4.0
 RESIDUE_BITS, FALLS_SHARE = 4.0, 0.99
-"""A register that shows a few bits at standstill is no ghost, nor is a filter's tail: only a velocity that stays counts."""
+"""A register that shows a few bits at standstill is no ghost, nor is a filter's tail: a velocity that stays is."""
 LEAST_S = 0.1
 
 

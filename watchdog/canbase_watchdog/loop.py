@@ -155,7 +155,8 @@ class Loop:
         self._collect(now_s)
 
     def _look_for_a_suspend(self) -> None:
-        before_s, self._suspended_s = self._suspended_s, suspended_s()
+        before_s = self._suspended_s
+        self._suspended_s = max(before_s, suspended_s())
         if self._suspended_s > before_s + SUSPENDED_S:
             self._note((SUSPEND, time.monotonic(), self._suspended_s - before_s))
             self._watchdog.on_suspend(self._suspended_s - before_s)
@@ -206,5 +207,5 @@ def _forget(_: Input) -> None:
 
 
 def suspended_s() -> float:
-    """How long this computer was suspended since its start [s]."""
+    """How long this computer was suspended since its start [s]; less, never more, by a pause between the two clocks."""
     return time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()

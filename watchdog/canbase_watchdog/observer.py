@@ -380,7 +380,7 @@ class Observer:
 
     def _on_sdo_request(self, node_id: int, data: bytes, now_s: float) -> bool:
         written = frames.decode_sdo_download(data)
-        stops = written is not None and written % frames.AXIS_OFFSET == _CONTROLWORD and frames.takes_power_away(data)
+        stops = written in _CONTROLWORDS and frames.takes_power_away(data)
         if written is not None and not stops:
             self._note_foreign(node_id, f"an SDO that writes {written:04X}h", now_s)
         if not frames.concerns_motion(data):
@@ -395,4 +395,4 @@ class Observer:
             (note or self._foreign.note)(node_id, f"{detail}, while it is enabled", now_s)
 
 
-_CONTROLWORD = frames.CONTROLWORD % frames.AXIS_OFFSET
+_CONTROLWORDS = (frames.CONTROLWORD, frames.CONTROLWORD + frames.AXIS_OFFSET)

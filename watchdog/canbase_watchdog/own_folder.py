@@ -92,9 +92,9 @@ def open_own_folder(path: Path, mode: int | None = None) -> int:
 def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
     """A file to write. At the end of the block it is on disk (fsync) and takes the place of `path`, file or link.
 
-    Where anything raises before that, `path` is as it was and nothing is left beside it. `private`: for this user alone;
-    otherwise with the mode, owner and group of the one before. Does not judge the folder: `open_own_folder` does.
-    Raises OSError, also where `path` is no regular file.
+    Where anything raises before that, `path` is as it was and nothing is left beside it. `private`: for this user
+    alone; otherwise with the mode, owner and group of the one before. Does not judge the folder: `open_own_folder`
+    does. Raises OSError, also where `path` is no regular file.
     """
     folder, new = os.open(path.parent, os.O_DIRECTORY | os.O_CLOEXEC), f".{path.name}.{os.urandom(4).hex()}"
     before = None

@@ -30,7 +30,7 @@ from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.drive_values import DriveValues, NamedValue
-from canbase_driver.drives.foreign_writes import WritesInBoot, foreign_write
+from canbase_driver.drives.foreign_writes import ForeignWrites, WritesInBoot
 from canbase_driver.drives.sdo_stop import SdoStop
 from canbase_driver.drives.signs_of_life import SignsOfLife
 from canbase_driver.drives.telemetry import Measures, Values
@@ -101,7 +101,8 @@ class CanopenNode:
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
         self._values = DriveValues(self.layout.values, self.layout.timing.cycle_s)
         self._sdo_stop = SdoStop(node_id, self._drives)
-        self._in_boot = WritesInBoot()
+        self._foreign = ForeignWrites()
+        self._in_boot = WritesInBoot(self._foreign)
         self._signs = SignsOfLife()
         self._written = ""
         """What another client has written since the boot has dealt with it; empty: nothing of what the boot sets."""
@@ -252,7 +253,7 @@ class CanopenNode:
         self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._patience, identify=self._identify)
         self._boot_up_at = -math.inf
         self._owed_stop = False
-        self._written, self._in_boot = "", WritesInBoot()
+        self._written, self._in_boot = "", WritesInBoot(self._foreign)
         self._go(Presence.BOOTING, now_s)
 
     def seek(self, now_s: float, sync_since: float) -> None:
@@ -406,7 +407,7 @@ class CanopenNode:
             self._in_boot.take(frame, self._boot)
             self._boot.on_frame(frame, now_s)
             return True
-        self._written = foreign_write(frame) or self._written
+        self._written = self._foreign.take(frame) or self._written
         if self.presence is Presence.READY:
             self._measures.on_frame(frame, now_s)
         elif (speed := self._sdo_stop.speed(frame)) is not None:

@@ -25,6 +25,9 @@ _WRITTEN: Final = 3 << 5
 _COMMAND: Final = 7 << 5
 _BLOCK: Final = (0xA0, 0xA4)
 """The same where it writes a block, without and with a checksum."""
+_SENDS_BLOCK, _BEGINS_BLOCK = 0xE1, 0xC0
+"""The node begins to send a block (first byte C0h to DEh, even): segments follow, which begin with their number."""
+_NUMBER: Final = 0x7F
 
 
 def is_of_scale(index: int, drives: Sequence[Drive] = ()) -> bool:
@@ -34,16 +37,34 @@ def is_of_scale(index: int, drives: Sequence[Drive] = ()) -> bool:
     return index in of_an_axis or index - AXIS_OFFSET in of_an_axis or index in noted
 
 
-def foreign_write(frame: Frame) -> str:
-    """The object that this SDO answer shows as written, like "1016h:1"; empty: none.
+class ForeignWrites:
+    """Takes every SDO answer of one node, and finds the writes in them."""
 
-    The caller knows that it answers no request of ours: outside of a boot the driver writes `_COMMANDED` alone.
-    """
-    data = frame.data
-    if len(data) != 8 or (data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK):
-        return ""
-    index = int.from_bytes(data[1:3], "little")
-    return "" if index in _COMMANDED else f"{index:04X}h:{data[3]}"
+    def __init__(self) -> None:
+        self._segment: int | None = None
+        """Number of the last segment of a block that the node sends to somebody; None: it sends none."""
+
+    def take(self, frame: Frame) -> str:
+        """The object that this answer shows as written, like "1016h:1"; empty: none.
+
+        The caller knows that it answers no request of ours: outside of a boot the driver writes `_COMMANDED` alone.
+        """
+        data = frame.data
+        if len(data) != 8 or self._is_segment(data[0]):
+            return ""
+        if data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK:
+            return ""
+        index = int.from_bytes(data[1:3], "little")
+        return "" if index in _COMMANDED else f"{index:04X}h:{data[3]}"
+
+    def _is_segment(self, first: int) -> bool:
+        """Segments are numbered from 1, again after each that the client has confirmed; another answer ends them."""
+        number = first & _NUMBER
+        if self._segment is not None and number in (self._segment + 1, 1):
+            self._segment = number
+            return True
+        self._segment = 0 if first & _SENDS_BLOCK == _BEGINS_BLOCK else None
+        return False
 
 
 class WritesInBoot:
@@ -52,14 +73,16 @@ class WritesInBoot:
     What the boot has not dealt with yet it sets or compares later. What it never deals with counts when it has ended.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, foreign: ForeignWrites) -> None:
+        self._foreign = foreign
         self._early: dict[bytes, str] = {}
         self._written = ""
 
     def take(self, frame: Frame, boot: NodeBoot) -> None:
         """An SDO answer, before `boot` takes it in."""
         at = frame.data[1:4]
-        name = "" if boot.may_confirm(at) else foreign_write(frame)
+        name = self._foreign.take(frame)
+        name = "" if boot.may_confirm(at) else name
         if name and boot.has_requested(at):
             self._written = name
         elif name:

@@ -1,9 +1,9 @@
 """Whether a base that is being stopped loses speed as it must. The limits follow from robot.yaml.
 
 A wheel may keep its speed for the lag of driver and drive, and must then be on its way to zero in twice the time of
-its ramp (half is room for double payload, slopes, slow current limits); in a quick stop with a quarter of 6085h, where
-that is more. It fails in the third cycle in a row above that, in the second one where cycles are slow; a wheel that
-stands is never looked at, so that the end of this way is the deadline of the stop.
+its ramp (half is room for double payload, slopes, slow current limits). It fails in the third cycle in a row above
+that, in the second one where cycles are slow; a wheel that stands is never looked at, so that the end of this way is
+the deadline of the stop.
 
 In a quick stop the fastest wheel with power must also be slower than it was one window of time ago: by a quarter of the
 deceleration, as soon as that exceeds the noise, at any speed (docs/decisions/0023). A wheel without power brakes
@@ -16,7 +16,7 @@ from collections import deque
 
 from canbase_config.derive import BRAKING_SAMPLES, LEAST_SAMPLES, samples, slope_window_s, speed_noise_mps
 from canbase_config.robot import Robot
-from canbase_config.stopping import BRAKING_SHARE, HELD_S, SLOPE_SHARE, lag_s, least_braking_mps2, ramp
+from canbase_config.stopping import BRAKING_SHARE, HELD_S, SLOPE_SHARE, lag_s, ramp
 
 LASTS_S = 0.08
 """It must not be slower within this time [s]: a wheel that was held may swing beyond the ramp of its drive."""
@@ -64,7 +64,7 @@ class Braking:
         self._from_mps = speed_mps * (1.0 + self._share) + self._fixed_mps
         limits = self._robot.limits
         if quick:
-            self._slope_mps2 = least_braking_mps2(self._robot)
+            self._slope_mps2 = BRAKING_SHARE * limits.deceleration_mps2
         else:
             time_s = ramp(limits, max(speed_mps, self._fixed_mps), turn_radps).time_s
             self._slope_mps2 = BRAKING_SHARE * max(speed_mps, self._fixed_mps) / time_s

@@ -201,7 +201,8 @@ class ControlLoop(threading.Thread):
                 cycle_at = now_s  # cycles that were missed are not made up for
 
     def _look_for_a_suspend(self, now_s: float) -> None:
-        before_s, self._suspended_s = self._suspended_s, suspended_s()
+        before_s = self._suspended_s
+        self._suspended_s = max(before_s, suspended_s())
         if self._suspended_s > before_s + SUSPENDED_S:
             self._core.on_suspend(now_s)
 
@@ -264,5 +265,5 @@ def lead() -> None:
 
 
 def suspended_s() -> float:
-    """How long this computer was suspended since its start [s]."""
+    """How long this computer was suspended since its start [s]; less, never more, by a pause between the two clocks."""
     return time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()

@@ -25,13 +25,13 @@ SEEN_S = 0.02
 """A sample waits for its SYNC, and the order to take the power for the next tick."""
 
 
-def robot(mps: float, deceleration_mps2: float, hz: float = 100.0, emergency_mps2: float | None = None) -> Robot:
+def robot(mps: float, deceleration_mps2: float, hz: float = 100.0) -> Robot:
     bench = bench_robot().model_dump()
     bench["limits"] |= {
         "linear_mps": mps,
         "acceleration_mps2": 3.0,
         "deceleration_mps2": deceleration_mps2,
-        "emergency_deceleration_mps2": emergency_mps2 or deceleration_mps2,
+        "emergency_deceleration_mps2": deceleration_mps2,
         "jerk_mps3": 100.0,
     }
     bench["rates"] |= {"control_hz": hz}
@@ -112,37 +112,6 @@ def test_the_driver_takes_the_power_after_a_time_that_does_not_depend_on_the_spe
 def test_a_drive_that_brakes_far_less_than_asked_is_found_as_soon(share: float) -> None:
     of = robot(3.0, 0.4)
     assert stopped_by_watchdog(of, share)[0] <= worst_s(of)
-
-
-SOFT_CASES = [(0.8, 1.0, 5.0), (2.0, 1.0, 4.0), (0.8, 0.4, 2.0)]
-
-
-def soft_stop_s(of: Robot, share: float) -> float:
-    """From the order to stop until a wheel with so soft a ramp is above the line of a quarter of 6085h."""
-    limits, watchdog = of.limits, of.watchdog
-    soft_mps2, least_mps2 = share * limits.emergency_deceleration_mps2, limits.emergency_deceleration_mps2 / 4.0
-    room_mps = watchdog.motion_tolerance_share * limits.linear_mps + watchdog.motion_tolerance_mps
-    line_s = (room_mps + least_mps2 * lag_s(of)) / (least_mps2 - soft_mps2)
-    return line_s + 3.0 / of.rates.control_hz + SEEN_S
-
-
-@pytest.mark.parametrize(("mps", "deceleration_mps2", "emergency_mps2"), SOFT_CASES)
-def test_a_drive_with_a_tenth_of_6085h_is_found_where_that_still_brakes_like_an_ordinary_stop(
-    mps: float, deceleration_mps2: float, emergency_mps2: float
-) -> None:
-    of = robot(mps, deceleration_mps2, emergency_mps2=emergency_mps2)
-    assert stopped_by_watchdog(of, 0.1)[0] <= soft_stop_s(of, 0.1)
-    assert stopped_by_driver(of, 0.1) <= soft_stop_s(of, 0.1)
-
-
-@pytest.mark.parametrize(("mps", "deceleration_mps2", "emergency_mps2"), SOFT_CASES)
-def test_a_drive_with_a_third_of_6085h_is_waited_for(
-    mps: float, deceleration_mps2: float, emergency_mps2: float
-) -> None:
-    of = robot(mps, deceleration_mps2, emergency_mps2=emergency_mps2)
-    power, world = stopped_by_watchdog(of, 0.35)
-    assert power == pytest.approx(mps / (0.35 * emergency_mps2), abs=0.2)
-    assert world.truth.v_left_mps == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_drive_that_brakes_with_half_of_it_is_waited_for() -> None:

@@ -61,11 +61,9 @@ def test_an_adapter_that_is_not_plugged_in_and_an_unknown_interface_are_named(ne
 
 
 def test_an_option_that_the_adapter_does_not_have_is_named_with_the_nearest() -> None:
-    bus = Bus(interface="udp_multicast", channel="239.74.163.2", extra={"prot": 5, "hop_limit": 0, "a": 1})
-    assert sorted(unknown_options(bus, {"port", "hop_limit"})) == [
-        "bus.extra.a is no option of python-can's udp_multicast: expected one of hop_limit, port",
-        "bus.extra.prot is no option of python-can's udp_multicast: did you mean port?",
-    ]
+    bus = Bus(interface="udp_multicast", channel="239.74.163.2", extra={"prot": 5, "hop_limit": 0, "auto_reset": 1})
+    told = "bus.extra.prot is no option of python-can's udp_multicast: did you mean port?"
+    assert list(unknown_options(bus, {"port", "hop_limit"})) == [told]
 
 
 @pytest.mark.parametrize(("interface", "told"), [("udp_multicast", "bus.extra.prot is no option"), ("socketcam", "")])

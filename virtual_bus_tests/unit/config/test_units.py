@@ -10,7 +10,7 @@ from canbase_config.derive import order_hold_s, watchdog_config
 from canbase_config.drive import Drive
 from canbase_config.load import load_robot, sample
 from canbase_config.profile import VelocityUnit
-from canbase_config.stopping import least_braking_mps2, max_wheel_mps, slowest_ramp_mps2
+from canbase_config.stopping import max_wheel_mps, slowest_ramp_mps2
 from canbase_config.units import m_per_count, motor_rev_per_s, mps_per_bit
 from canbase_config.watchdog import WatchdogConfig
 from support.crews import robot_with
@@ -149,14 +149,3 @@ def test_the_slowest_ramp_is_a_quarter_of_the_limits_or_what_robot_yaml_says() -
 
 def test_a_drive_with_a_clock_of_its_own_does_not_answer_each_sync() -> None:
     assert [drive.answers_sync for drive in watchdog_config(robot_with("roboteq")).drives] == [False, False]
-
-
-@pytest.mark.parametrize(("kind", "least_mps2"), [("generic", 2.0), ("roboteq", 2.0), ("epos4", 0.5)])
-def test_a_quarter_of_6085h_is_asked_for_where_the_drives_are_known_to_brake_by_it(
-    kind: str, least_mps2: float
-) -> None:
-    robot = robot_with(kind)
-    limits = robot.limits.model_copy(update={"deceleration_mps2": 1.0, "emergency_deceleration_mps2": 8.0})
-    assert least_braking_mps2(robot.model_copy(update={"limits": limits})) == least_mps2
-    soft = limits.model_copy(update={"emergency_deceleration_mps2": 1.5})
-    assert least_braking_mps2(robot.model_copy(update={"limits": soft})) == 0.5

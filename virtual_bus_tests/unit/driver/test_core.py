@@ -85,6 +85,15 @@ def test_a_reset_asks_the_watchdog_in_every_cycle_until_it_answers(core: DriverC
     assert outcomes == []
 
 
+def test_a_suspend_breaks_off_a_reset(core: DriverCore) -> None:
+    """Its clock stood still meanwhile, and nobody waits for it any more."""
+    core.on_frame(WATCHING, 10.0)
+    outcomes: list[Outcome] = []
+    core.request_reset(10.0, outcomes.append)
+    core.on_suspend(10.0)
+    assert outcomes == [Outcome(False, "broken off: the computer was suspended; reset again")]
+
+
 def test_a_shutdown_breaks_off_a_reset_and_tells_its_caller(core: DriverCore) -> None:
     core.on_frame(WATCHING, 10.0)
     outcomes: list[Outcome] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.drives.foreign_writes import foreign_write
+from canbase_driver.drives.foreign_writes import ForeignWrites
 
 
 @pytest.mark.parametrize(
@@ -41,4 +41,19 @@ from canbase_driver.drives.foreign_writes import foreign_write
     ],
 )
 def test_the_object_is_named_that_decides_how_the_drive_stops(data: str, shown: str) -> None:
-    assert foreign_write(Frame(0x581, bytes.fromhex(data))) == shown
+    assert ForeignWrites().take(Frame(0x581, bytes.fromhex(data))) == shown
+
+
+# another client reads an object of 900 bytes in a block ── 127 segments, 2 more ── its end ── then a write
+def test_the_segments_of_a_block_that_is_read_are_no_writes() -> None:
+    foreign = ForeignWrites()
+
+    def taken(first: int) -> str:
+        return foreign.take(Frame(0x581, bytes((first, 0x16, 0x10, 1, 0, 0, 0, 0))))
+
+    assert taken(0xC6) == ""
+    assert [number for number in range(1, 128) if taken(number)] == []
+    assert (taken(0x01), taken(0x82), taken(0xC1)) == ("", "", "")
+    assert taken(0x60) == "1016h:1"
+    assert (taken(0xC6), taken(0x60)) == ("", "1016h:1"), "not the first segment"
+    assert (taken(0xC6), taken(0x01), taken(0x80), taken(0x60)) == ("", "", "", "1016h:1"), "aborted"

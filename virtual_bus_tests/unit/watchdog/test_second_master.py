@@ -390,6 +390,7 @@ def test_commands_that_make_no_sense_are_counted() -> None:
         ("23 7f 12 02 c1 05 00 00", "127F"),
         ("2b 73 60 00 00 00 00 00", "6073"),  # the greatest current: without it no motor brakes
         ("23 0f 20 00 00 00 00 00", "200F"),  # of the manufacturer
+        ("2b 40 20 00 00 00 00 00", "2040"),
         ("c2 16 10 01 04 00 00 00", "1016"),  # block
     ],
 )
