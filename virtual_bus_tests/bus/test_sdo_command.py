@@ -94,5 +94,5 @@ def test_beside_a_driver_nothing_is_written_and_the_sentence_says_what_would_bec
         done = canbase("sdo", "write", "1", "1016:1", "0", "-c", config)
     assert done.returncode == 1
     said = " ".join(done.stderr.split())
-    assert "canbase's driver runs on this bus. The driver undoes a write to 1016h:1: it boots node 1 anew" in said
+    assert "canbase's driver runs on this bus. After a write to 1016h:1 the driver boots node 1 anew" in said
     assert said.endswith("End it first, or --force")

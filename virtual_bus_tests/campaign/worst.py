@@ -229,7 +229,7 @@ def rows_table(found: dict[tuple[str, str], Found]) -> str:
         stands = "" if worst_found.reported or worst_found.value == math.inf else ", at standstill"
         value = f"{worst_found.value:.2f} s" if worst_found.value < math.inf else "no stop"
         cell = f"{beyond}{value}{beyond}{stands} at {worst_found.point}"
-        lines.append(f"| [{row}](safety.md#{row}) | {name} | {row_s:.2f} s | {cell} |")
+        lines.append(f"| {row} | {name} | {row_s:.2f} s | {cell} |")
     return "\n".join(lines)
 
 
