@@ -299,12 +299,14 @@ def part_of(
     old_m: float = 4.0,
     noise_m: float = 0.002,
     step_m: float = 0.001,
+    unread: tuple[int, ...] = (),
 ) -> str:
     """What is found in 360 readings of a wall 4 m away in steps of `step_m`, of which `frozen` are always `old_m`."""
     watch, told, random = FrozenWatch(0.5, noisy=noisy), "", np.random.default_rng(7)
     for number in range(round(seconds * 20)):
         ranges_m = np.round((4.0 + random.normal(0.0, noise_m, 360)) / step_m) * step_m
         ranges_m[[beam % 360 for beam in frozen]] = old_m
+        ranges_m[list(unread)] = NAN
         scan = Scan(ranges_m, -math.pi, math.tau / 360, 0.05, 10.0)
         told = told or watch.look(scan, 0.05 * number, moves=moves)
     return told
@@ -316,6 +318,10 @@ def test_a_twelfth_that_is_frozen_while_the_base_moves_is_found_wherever_it_is(f
     assert part_of(frozen, seconds=0.4) == ""  # not yet
     assert part_of(frozen[1:]) == ""  # less than a twelfth
     assert part_of(frozen, moves=False) == ""
+
+
+def test_a_reading_that_is_missing_from_the_first_scan_on_splits_no_frozen_part() -> None:
+    assert part_of(range(100, 131), unread=(110,)).startswith("30 of its 360 readings, beside each other")
 
 
 @pytest.mark.parametrize("old_m", [INF, NAN, 10.0, 0.05, 0.0])
