@@ -85,8 +85,9 @@ class FrozenWatch:
     def _part(self, ranges: Floats, scan: Scan, moved_s: float) -> str:
         """Rule 5. `moved_s`: how long the base has moved since the scan before [s]."""
         if ranges.size != self._last.size:
-            self._last = np.full(ranges.size, math.nan)
+            self._last = ranges
             self._equal_scans, self._equal_s = np.zeros((2, ranges.size))
+            return ""
         equal = (ranges == self._last) | (np.isnan(ranges) & np.isnan(self._last))
         self._last = ranges
         self._equal_scans = np.where(equal, self._equal_scans + 1, 0)
