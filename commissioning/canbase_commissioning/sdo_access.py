@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 from canbase_commissioning.object_dictionary import Address, encode, statuswords
+from canbase_config.drive import Drive
 from canbase_config.object_map import (
     AXIS_OFFSET,
-    CONTROLWORD,
     STATUSWORD,
-    TARGET_VELOCITY,
-    VL_TARGET_VELOCITY,
     place,
 )
 from canbase_config.robot import Robot
+from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver.boot.steps import Steps
+from canbase_driver.boot.vl_settings import FACTOR
 from canbase_driver.cia301.sdo_client import WRITE_ONLY, Read, SdoAborted, Write
 from canbase_driver.cia402 import decode_statusword
-from canbase_driver.drives.foreign_writes import is_of_scale
-
-COMMANDS: Final = frozenset((CONTROLWORD, TARGET_VELOCITY, VL_TARGET_VELOCITY))
-"""What the driver orders in each cycle; of the first axis."""
+from canbase_driver.drives.foreign_writes import COMMANDED
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +67,9 @@ def beside_driver(node_id: int, at: Address, robot: Robot | None) -> str:
     drives = [drive for drive in robot.drives if drive.node_id == node_id] if robot else []
     if robot is not None and not drives:
         return f"Node {node_id} is no drive of robot.yaml, and the driver does not notice the write"
-    if at.index in COMMANDS or at.index - AXIS_OFFSET in COMMANDS:
+    if at.index in COMMANDED:
         return f"The driver sends {at} itself; while the motor has power, the watchdog stops the robot for such a write"
-    if is_of_scale(at.index, drives):
+    if _is_compared(at.index, drives):
         return (
             f"After a write to {at} the driver boots node {node_id} anew, as soon as no motor of it has power. It gets "
             "no power where `expects` in robot.yaml has another value; without an entry there the new value counts. "
@@ -84,6 +80,13 @@ def beside_driver(node_id: int, at: Address, robot: Robot | None) -> str:
         "what the boot sets gets its value again. Until then the watchdog may stop the robot, because the write is a "
         "sign of another master"
     )
+
+
+def _is_compared(index: int, drives: list[Drive]) -> bool:
+    """Whether the boot compares this object with `expects` of these drives and never sets it; it sets 604Ch."""
+    of_an_axis = SCALE_OBJECTS.keys() - {FACTOR}
+    noted = {each.index for drive in drives for each in drive.expects}
+    return index in of_an_axis or index - AXIS_OFFSET in of_an_axis or index in noted
 
 
 def status_places(node_id: int, robot: Robot | None) -> tuple[Address, ...]:

@@ -131,7 +131,7 @@ STOPS: tuple[Twin, ...] = (
     Twin(DRIVER, "repeats its last setpoints for ever, then zero is ordered", fault("driver_repeats", heartbeats=True),
          JOYSTICK, ZERO_S),
     Twin(DRIVER, "ignores zero, then zero is ordered", _ignores_zero, JOYSTICK, ZERO_S),
-    Twin("cmd_vel", "somebody publishes straight to it, then zero is ordered", _straight_to_cmd_vel, JOYSTICK, ZERO_S),
+    Twin("cmd_vel", "another node publishes to it, then zero is ordered", _straight_to_cmd_vel, JOYSTICK, ZERO_S),
     Twin("second master", "sends setpoints and SYNC", _second_master),
     Twin("joystick", "dies", _joystick_dies, JOYSTICK),
     Twin("odometry", "stale", fault("odometry_lost")),

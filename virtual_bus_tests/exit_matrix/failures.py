@@ -216,7 +216,7 @@ BUS = (
     ),
     Row(
         "cmd_vel",
-        "somebody publishes straight to it, then zero is ordered",
+        "another node publishes to it, then zero is ordered",
         then_zero(publish_straight),
         (by.WATCHDOG_KEPT,),
         publish_no_more,

@@ -7,34 +7,24 @@ driver commands by SDO itself, and the watchdog's "disable voltage".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
-from canbase_config.drive import Drive
 from canbase_config.object_map import AXIS_OFFSET, CONTROLWORD, TARGET_VELOCITY, VL_TARGET_VELOCITY
-from canbase_config.scale_objects import SCALE_OBJECTS
 from canbase_driver.boot.node_boot import NodeBoot
-from canbase_driver.boot.vl_settings import FACTOR
 from canbase_driver.cia301.frame import Frame
 
-_COMMANDED: Final = frozenset(
+COMMANDED: Final = frozenset(
     index + offset for index in (CONTROLWORD, TARGET_VELOCITY, VL_TARGET_VELOCITY) for offset in (0, AXIS_OFFSET)
 )
+"""What the driver sends itself, of both axes: 6040h, 60FFh, and 6042h of mode 2."""
 _WRITTEN: Final = 3 << 5
 """First byte of the answer to a Write (CiA 301, SDO download)."""
 _COMMAND: Final = 7 << 5
 _BLOCK: Final = (0xA0, 0xA4)
 """The same where it writes a block, without and with a checksum."""
 _SENDS_BLOCK, _BEGINS_BLOCK = 0xE1, 0xC0
-"""The node begins to send a block (first byte C0h to DEh, even): segments follow, which begin with their number."""
+"""The node begins to send a block (CiA 301, upload: scs 6, ss 0): segments follow, which begin with their number."""
 _NUMBER: Final = 0x7F
-
-
-def is_of_scale(index: int, drives: Sequence[Drive] = ()) -> bool:
-    """Whether the boot only compares this object, with `expects` of these drives, and does not set it as 604Ch."""
-    noted = {each.index for drive in drives for each in drive.expects}
-    of_an_axis = SCALE_OBJECTS.keys() - {FACTOR}
-    return index in of_an_axis or index - AXIS_OFFSET in of_an_axis or index in noted
 
 
 class ForeignWrites:
@@ -42,12 +32,12 @@ class ForeignWrites:
 
     def __init__(self) -> None:
         self._segment: int | None = None
-        """Number of the last segment of a block that the node sends to somebody; None: it sends none."""
+        """Number of the last segment of a block that another client reads from the node; None: no block is read."""
 
     def take(self, frame: Frame) -> str:
         """The object that this answer shows as written, like "1016h:1"; empty: none.
 
-        The caller knows that it answers no request of ours: outside of a boot the driver writes `_COMMANDED` alone.
+        The caller knows that it answers no request of ours: outside of a boot the driver writes only `COMMANDED`.
         """
         data = frame.data
         if len(data) != 8 or self._is_segment(data[0]):
@@ -55,7 +45,7 @@ class ForeignWrites:
         if data[0] & _COMMAND != _WRITTEN and data[0] not in _BLOCK:
             return ""
         index = int.from_bytes(data[1:3], "little")
-        return "" if index in _COMMANDED else f"{index:04X}h:{data[3]}"
+        return "" if index in COMMANDED else f"{index:04X}h:{data[3]}"
 
     def _is_segment(self, first: int) -> bool:
         """Segments are numbered from 1, again after each that the client has confirmed; another answer ends them."""

@@ -57,7 +57,7 @@ FAILURES = (
     ("drive", "starts again", Cause.NODE_RESTARTED, Cause.NODE_RESTARTED),
     ("motor_driver", "repeats its last setpoints for ever, then zero is ordered", Cause.SETPOINTS_KEPT, Cause.REPORTED),
     ("motor_driver", "ignores zero, then zero is ordered", Cause.SETPOINTS_KEPT, Cause.REPORTED),
-    ("cmd_vel", "somebody publishes straight to it, then zero is ordered", Cause.TWO_COMMANDERS, Cause.REPORTED),
+    ("cmd_vel", "another node publishes to it, then zero is ordered", Cause.TWO_COMMANDERS, Cause.REPORTED),
     ("second master", "sends setpoints and SYNC", Cause.SECOND_MASTER, Cause.SECOND_MASTER),
     ("joystick", "dies", Cause.SOURCE_LOST, NO_STOP),
     ("scan", "stale", Cause.SCANNER, NO_STOP),
