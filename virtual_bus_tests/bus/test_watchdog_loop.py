@@ -80,6 +80,17 @@ def test_a_suspend_at_speed_stops_the_base(rig: Rig, monkeypatch: pytest.MonkeyP
     assert cause(rig) is TripCause.LOOP_LATE
 
 
+# driving ── between the reading of CLOCK_BOOTTIME and of CLOCK_MONOTONIC the loop pauses once for 0.5 s ── no suspend
+def test_a_pause_between_the_two_clocks_is_no_suspend(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig.robot.drive_at(300)
+    before_s = loop.suspended_s()
+    readings = iter((before_s - 0.5,))
+    monkeypatch.setattr(loop, "suspended_s", lambda: next(readings, before_s))
+    time.sleep(0.3)
+    assert next(readings, None) is None, "it was read"
+    assert cause(rig) is TripCause.NONE
+
+
 # last lease ── 0.25 s ── quick stop on the bus, and the wheels brake for 0.3 s
 def test_leases_end_at_speed(rig: Rig) -> None:
     rig.robot.drive_at(300)
