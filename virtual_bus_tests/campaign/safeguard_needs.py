@@ -184,7 +184,7 @@ NEEDS: tuple[Need, ...] = (
     Need("filter:estop", ("estop_pressed", "estop_stale")),
     Need("filter:obstacle", ("obstacle",)),
     Need("filter:blind", ("scanner_blind_ahead", "scanner_one_beam", "scanner_zero_ahead")),
-    Need("filter:frozen", ("scanner_frozen", "scanner_partly_frozen", "scanner_by_turns")),
+    Need("filter:frozen", ("scanner_frozen", "scanner_by_turns")),
     Need("filter:repeated_stamp", ("scanner_old_stamps",), "filter:frozen+filter:late_scans"),
     Need("action:timeout_and_progress", ("cmd_vel_ends",)),
 )  # fmt: skip

@@ -63,7 +63,7 @@ def test_the_page_has_the_worst_of_each_failure_that_is_searched() -> None:
 def test_the_page_has_each_stated_time_beside_the_worst_that_was_found() -> None:
     """A new row with a failure that a driving base can have is missing on the page until it was searched."""
     lines = section(PAGE.read_text(encoding="utf-8"), ROWS_COMMAND).splitlines()[2:]
-    on_page = [(line.split("](")[0].removeprefix("| ["), line.split(" | ")[1]) for line in lines]
+    on_page = [(line.split(" | ")[0].removeprefix("| "), line.split(" | ")[1]) for line in lines]
     assert on_page == stated_rows()
 
 

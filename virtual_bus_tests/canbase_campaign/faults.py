@@ -82,7 +82,6 @@ ADDED_LATER = (
     "overvoltage",
     "partition",
     "pushed",
-    "scanner_partly_frozen",
     "scanner_clock_ahead",
     "sender_clock_slewed",
     "settings_lost",

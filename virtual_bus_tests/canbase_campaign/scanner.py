@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from canbase_campaign.lidar import ByTurns, Fault, Frozen, FrozenPart, Late, Lidar, blind, one_beam_left
+from canbase_campaign.lidar import ByTurns, Fault, Frozen, Late, Lidar, blind, one_beam_left
 from canbase_velocity.scan import Scan
 
 NAN = math.nan
@@ -67,7 +67,6 @@ LIES = {
     "scanner_zero_ahead": Lie("a scanner reads 0 in front", lambda: blind(0.0, 0.5), hides=True),
     "scanner_one_beam": Lie("one beam of a scanner is left", lambda: one_beam_left, hides=True),
     "scanner_frozen": Lie("old readings come with new stamps", lambda: Frozen(new_stamps=True)),
-    "scanner_partly_frozen": Lie("a fifth of a scanner's readings, in front, is old", lambda: FrozenPart(0.2)),
     "scanner_old_stamps": Lie("the same scan comes again and again", lambda: Frozen(new_stamps=False)),
     "scanner_by_turns": Lie("three old scans come by turns, with new stamps", lambda: ByTurns(3, new_stamps=True)),
     "scanner_late": Lie("each scan comes later than the one before", lambda: Late(2.0, per_s=1.0)),
