@@ -34,7 +34,7 @@ def stays_latched(robot: RunningRobot, cause: str) -> None:
     assert cause in f"{status.cause}: {status.detail}", status
     assert all(each.state == DriverStatus.LATCHED for each in robot.status.since(began_s))
     robot.make_ready()
-    assert robot.driven(0.1)
+    robot.wait_whole()  # goals wait until DDS has given up what was killed
 
 
 # `canbase stop` ── SIGKILL of the driver ── start: still latched ── reset ── drives
