@@ -159,10 +159,10 @@ else
 endif
 
 .PHONY: pictures
-pictures: $(VENV)/ready ## the pictures of docs/web.md, explain.md, qualify.md and evidence.md, from the tests in a real browser
+pictures: $(VENV)/ready ## the pictures of docs/web.md, explain.md and qualify.md, from the tests in a real browser
 	@mkdir -p build/pictures docs/pictures
 	CANBASE_PICTURES=$(CURDIR)/build/pictures pytest -q $(TESTS)/bus/test_explain_page.py $(TESTS)/bus/test_qualification_page.py $(TESTS)/bus/test_evidence_page.py $(TESTS)/ros/test_web.py
-	for picture in $$(grep -ho '\(web\|explain\|qualify\|evidence\)_[a-z_]*\.png' docs/web.md docs/explain.md docs/qualify.md docs/evidence.md); do cp build/pictures/$$picture docs/pictures; done
+	for picture in $$(grep -ho '\(web\|explain\|qualify\|evidence\)_[a-z_]*\.png' docs/web.md docs/explain.md docs/qualify.md); do cp build/pictures/$$picture docs/pictures; done
 
 .PHONY: hazards
 hazards: $(VENV)/ready ## checks hazards.yaml and writes the tables of docs/safety.md

@@ -1,6 +1,6 @@
 """Programs of other authors that the guest runs, and the scenarios that need them.
 
-They are no part of canbase: a folder outside of it has them, docs/independent_stacks.md. Without that folder their
+They are no part of canbase: a folder outside of it has them, docs/verification.md. Without that folder their
 scenarios are skipped, and the output says so.
 """
 
@@ -38,9 +38,9 @@ def _missing(files: tuple[str, ...], programs: Path | None) -> str:
     if not files:
         return ""
     if programs is None:
-        return f"{VARIABLE} names no folder with {', '.join(files)}: docs/independent_stacks.md"
+        return f"{VARIABLE} names no folder with {', '.join(files)}: docs/verification.md"
     missing = [file for file in files if not (programs / file).is_file()]
-    return f"{programs} has no {', '.join(missing)}: docs/independent_stacks.md" if missing else ""
+    return f"{programs} has no {', '.join(missing)}: docs/verification.md" if missing else ""
 
 
 def copy_to(programs: Path | None, guest: Path) -> None:

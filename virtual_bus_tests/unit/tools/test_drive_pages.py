@@ -72,7 +72,7 @@ def test_no_drive_is_called_tested_on_hardware_while_the_table_of_such_tests_is_
 
 def test_the_page_of_the_kind_that_independent_stacks_have_driven_says_so_and_no_other_one() -> None:
     """The robot of the Linux guest, which drives slaves of ros2_canopen, has the drives of the sample."""
-    yes = "[Independent CANopen stacks](../independent_stacks.md): yes."
+    yes = "[Independent CANopen stacks](../verification.md#independent-canopen-stacks): yes."
     named = {kind for kind in profile_names() if yes in read(kind)}
     assert named == {drive.profile for drive in load_robot(sample("example_can0")).robot.drives}
     others = set(profile_names()) - named

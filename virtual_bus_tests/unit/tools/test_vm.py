@@ -306,7 +306,7 @@ def test_scenarios_with_programs_of_other_authors_are_skipped_with_the_remedy_wh
     assert table.report([told("goal")], 60.0, skipped) == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
         "SKIPPED, nothing is known of it: CANopenNode: CANBASE_INDEPENDENT_STACKS names no folder with "
-        "canopend: docs/independent_stacks.md"
+        "canopend: docs/verification.md"
     )
 
 
@@ -315,7 +315,7 @@ def test_a_folder_without_one_of_the_programs_is_told_which_one(tmp_path: Path) 
 
     skipped = independent_stacks.skipped(ALL, tmp_path)
 
-    assert skipped["drives of ros2_canopen"] == f"{tmp_path} has no cia402_slave.eds: docs/independent_stacks.md"
+    assert skipped["drives of ros2_canopen"] == f"{tmp_path} has no cia402_slave.eds: docs/verification.md"
 
 
 def test_programs_of_other_authors_that_are_there_go_into_the_guest_and_nothing_else_does(tmp_path: Path) -> None:

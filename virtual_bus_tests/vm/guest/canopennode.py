@@ -2,7 +2,7 @@
 adopted by `canbase adopt`.
 
 The gateway reads, writes, is refused, gives node ids, enables the motors and drives; then its process is killed.
-docs/independent_stacks.md has what differed.
+docs/verification.md has what differed.
 """
 
 from __future__ import annotations

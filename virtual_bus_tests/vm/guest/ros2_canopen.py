@@ -1,7 +1,7 @@
 """Two drives of another author, the CiA 402 slave of ros2_canopen on lely-core, under an installed canbase.
 
 They have no control socket: candump shows their positions, and their own log when their motor has stopped.
-docs/independent_stacks.md has what differed.
+docs/verification.md has what differed.
 """
 
 from __future__ import annotations
