@@ -165,7 +165,7 @@ pictures: $(VENV)/ready ## the pictures of docs/web.md, explain.md and qualify.m
 	for picture in $$(grep -ho '\(web\|explain\|qualify\|evidence\)_[a-z_]*\.png' docs/web.md docs/explain.md docs/qualify.md); do cp build/pictures/$$picture docs/pictures; done
 
 .PHONY: hazards
-hazards: $(VENV)/ready ## checks hazards.yaml and writes the tables of docs/safety.md
+hazards: $(VENV)/ready ## checks hazards.yaml and writes the ten rows of docs/safety.md
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m hazards
 
 .PHONY: refusals
@@ -177,8 +177,8 @@ drive-pages: $(VENV)/ready ## docs/drives/KIND.md: what the boot writes, how eac
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.drive_pages
 
 .PHONY: structure
-structure: $(VENV)/ready ## writes what each file is for into docs/architecture.md
-	PYTHONPATH=$(CURDIR)/docs:$(CURDIR)/virtual_bus_tests python -m site_builder
+structure: $(VENV)/ready ## docs/states.svg: the states of the driver, from their table
+	PYTHONPATH=$(CURDIR)/docs python -m site_builder
 
 .PHONY: recording
 recording: $(VENV)/ready ## docs/demo.svg: what `canbase demo` prints now

@@ -1,1 +1,1 @@
-"""The pages of the documentation site that are made from packages, commands, messages and decision records."""
+"""The pages of the documentation site that are made from packages, commands, messages, hazards and decision records."""

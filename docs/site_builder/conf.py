@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2] / "virtual_bus_tests"))
 
 from site_builder import docstrings, modules, offline, pages, source_pages
 

@@ -1,4 +1,4 @@
-"""The tree of the sources for docs/architecture.md: one line for each file, from its docstring."""
+"""The page of all files: one line for each, the first one of its docstring."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from pathlib import Path
 
 from site_builder.modules import Module, modules, shipped_packages
 
-COMMAND = "make structure"
+_HEAD = """\
+# Files
+
+What each file of a shipped package is for: the first line of its docstring. How they work together:
+[architecture](../architecture.md).
+
+"""
 
 
-def section(root: Path) -> str:
+def page(root: Path) -> str:
     """Markdown: one table for each folder of a shipped package."""
     found = [module for package in shipped_packages(root) for module in modules(package, root)]
-    return "\n\n".join(
-        _folder(folder, list(files)) for folder, files in groupby(found, key=lambda module: module.path.parent)
-    )
+    folders = groupby(found, key=lambda module: module.path.parent)
+    return _HEAD + "\n\n".join(_folder(folder, list(files)) for folder, files in folders) + "\n"
 
 
 def _folder(folder: Path, files: list[Module]) -> str:
@@ -23,7 +28,7 @@ def _folder(folder: Path, files: list[Module]) -> str:
     rows = [
         f"| `{module.path.name}` | {_cell(module.purpose)} |" for module in files if module.path.name != "__init__.py"
     ]
-    return "\n".join([f"### `{folder}/`", "", *about, "", "| file | purpose |", "|---|---|", *rows])
+    return "\n".join([f"## `{folder}/`", "", *about, "", "| file | purpose |", "|---|---|", *rows])
 
 
 def _cell(text: str) -> str:

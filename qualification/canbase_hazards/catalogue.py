@@ -16,7 +16,7 @@ Sentence = Annotated[str, Field(min_length=3)]
 
 
 class Part(Enum):
-    """What fails; one table of docs/safety.md each."""
+    """What fails; one heading of docs/generated/hazards.md each."""
 
     PROCESS = "process"
     BUS_AND_DRIVES = "bus_and_drives"
@@ -27,7 +27,7 @@ class Part(Enum):
 
     @property
     def heading(self) -> str:
-        """Of its table."""
+        """Of its hazards."""
         return _HEADINGS[self]
 
 

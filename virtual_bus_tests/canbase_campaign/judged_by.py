@@ -99,7 +99,7 @@ class Bounds:
 
     @classmethod
     def of(cls, robot: Robot) -> Bounds:
-        """The speeds by physics; the times are those of docs/safety.md, and of the first rung after them."""
+        """The speeds by physics; the times are those of hazards.yaml, and of the first rung after them."""
         fastest_mps = max_wheel_mps(robot)
         beside_mps = FASTER_MPS + BESIDE_SHARE * fastest_mps
         return cls(

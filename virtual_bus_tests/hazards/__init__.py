@@ -1,1 +1,1 @@
-"""The page docs/safety.md of the catalogue of hazards, and whether the tests that it names exist and run."""
+"""Pages of the catalogue of hazards, and whether the tests that it names exist and run."""

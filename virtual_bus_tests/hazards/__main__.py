@@ -1,4 +1,4 @@
-"""`make hazards`: checks hazards.yaml and writes the tables of docs/safety.md."""
+"""`make hazards`: checks hazards.yaml and writes the ten rows of docs/safety.md."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def main() -> int:
     rows = catalogue.load()
     problems = [f"{row.id}: {why}" for row in rows.rows for name in row.tests if (why := proofs.problem(name))]
     text = page.PAGE.read_text(encoding="utf-8")
-    made = rewritten(text, page.COMMAND, page.tables(rows, page.sample_robot()))
+    made = rewritten(text, page.COMMAND, page.ten_rows(rows, page.sample_robot()))
     if check and made != text:
         problems.append("docs/safety.md is out of date: run `make hazards`")
     for line in problems:

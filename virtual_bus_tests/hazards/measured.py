@@ -1,4 +1,4 @@
-"""The longest stop that docs/stop_times.md has of a row's failures: the column `measured` of docs/safety.md. Pure."""
+"""The longest stop that docs/stop_times.md has of a row's failures: `Measured` on the page of hazards. Pure."""
 
 from __future__ import annotations
 

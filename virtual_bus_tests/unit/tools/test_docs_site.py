@@ -20,16 +20,15 @@ from site_builder import (
 )
 from site_builder.docstrings import converted
 from site_builder.modules import ROOT, Module, modules, purpose, shipped_packages
-from support.marked_page import section
 
-ARCHITECTURE = ROOT / "docs" / "architecture.md"
 ALL = [module for package in shipped_packages() for module in modules(package)]
 
 
-def test_the_tree_in_architecture_md_is_that_of_the_sources() -> None:
-    written = section(ARCHITECTURE.read_text(encoding="utf-8"), structure.COMMAND)
+def test_the_page_of_files_has_every_shipped_module_with_its_first_line() -> None:
+    page = structure.page(ROOT)
 
-    assert written.strip() == structure.section(ROOT).strip(), "out of date: run `make structure`"
+    assert [module for module in ALL if module.purpose.replace("|", "∣") not in page] == []
+    assert page.count("\n## `") == len({module.path.parent for module in ALL})
 
 
 def test_the_picture_of_the_states_is_the_one_of_the_table() -> None:
@@ -40,15 +39,15 @@ def test_the_picture_of_the_states_is_the_one_of_the_table() -> None:
     assert ends == set(Phase), "each state can be reached"
 
 
-def test_a_new_file_and_a_changed_first_line_change_the_tree(tmp_path: Path) -> None:
+def test_a_file_has_a_line_on_the_page_of_files(tmp_path: Path) -> None:
     (tmp_path / "pyproject.toml").write_text('[tool.scikit-build]\nwheel.packages = ["arm/canbase_arm"]\n')
     folder = tmp_path / "arm" / "canbase_arm"
     folder.mkdir(parents=True)
     (folder / "__init__.py").write_text('"""The arm."""\n')
     (folder / "joint.py").write_text('"""One joint.\n\nMore of it.\n"""\n')
 
-    assert structure.section(tmp_path) == (
-        "### `arm/canbase_arm/`\n\nThe arm.\n\n| file | purpose |\n|---|---|\n| `joint.py` | One joint. |"
+    assert structure.page(tmp_path).endswith(
+        "\n\n## `arm/canbase_arm/`\n\nThe arm.\n\n| file | purpose |\n|---|---|\n| `joint.py` | One joint. |\n"
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from pydantic import ValidationError
 
@@ -96,7 +98,26 @@ def test_a_base_that_never_stood_took_the_longest() -> None:
 
 def test_the_page_is_up_to_date() -> None:
     text = page.PAGE.read_text(encoding="utf-8")
-    assert rewritten(text, page.COMMAND, page.tables(CATALOGUE, ROBOT)) == text, "run `make hazards`"
+    assert rewritten(text, page.COMMAND, page.ten_rows(CATALOGUE, ROBOT)) == text, "run `make hazards`"
+
+
+CARDS = dict(re.findall(r"^### (.+?)$\n(.+?)(?=^#|\Z)", page.cards(CATALOGUE, ROBOT), re.MULTILINE | re.DOTALL))
+
+
+@pytest.mark.parametrize("row", CATALOGUE.rows, ids=lambda row: row.id)
+def test_the_card_of_a_hazard_has_all_that_its_row_states(row: Row) -> None:
+    card = re.sub(r"\[(\w+)\]\(#[\w-]+\)", r"\1", CARDS[row.id.replace("_", " ").capitalize()])
+    stated = (row.failure, row.unsafe_control_action, row.constraint, row.layer, row.reaction, row.not_covered)
+    assert [text for text in (*stated, row.within_s, *row.tests) if text not in card] == []
+    assert ("Acts within" in card, "Not covered" in card) == (bool(row.within_s), bool(row.not_covered))
+
+
+def test_a_card_names_the_measured_stop_and_links_the_rows_that_it_names() -> None:
+    stop = longest_stop(next(row for row in CATALOGUE.rows if row.id == "driver_killed_or_hung"), STOPS)
+    assert stop is not None
+    assert f"- **Measured:** {stop.cell} ({stop.name}, {stop.source})\n" in CARDS["Driver killed or hung"]
+    assert "[dead_encoder_after_a_tap](#dead-encoder-after-a-tap)" in CARDS["Encoder lost slow or at rest"]
+    assert set(page.FIRST) <= {row.id for row in CATALOGUE.rows}
 
 
 def test_the_distance_is_the_way_until_it_acts_and_braking() -> None:

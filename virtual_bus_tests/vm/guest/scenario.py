@@ -50,7 +50,7 @@ def timed(row: Row, stop: Standstill, limit: float, caught: str) -> Row:
 
 
 def limit_s(robot: Robot, layers: Collection[Layer]) -> float:
-    """What docs/safety.md promises where these layers catch a failure at the speed of the scenarios."""
+    """What hazards.yaml promises where these layers catch a failure at the speed of the scenarios."""
     return max(layer.limit_s(robot.config, SPEED_MPS) for layer in layers)
 
 

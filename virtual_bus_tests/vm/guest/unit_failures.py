@@ -78,7 +78,7 @@ def stopped(part: str) -> Scenario:
 
 def restarted(part: str) -> Scenario:
     """`systemctl restart`: it comes up again and stands. After driver and watchdog also with the stick held on; a
-    new mux follows whoever orders, so that otherwise the hand lets go when the robot stands: docs/safety.md."""
+    new mux follows whoever orders, so that otherwise the hand lets go when the robot stands."""
 
     def scenario(robot: Robot) -> Row:
         _at_speed(robot, part)
