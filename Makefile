@@ -126,7 +126,7 @@ DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis sta
   $(UNIT)/chain/test_layouts_agree.py $(UNIT)/runtime/test_latch_record.py
 
 .PHONY: evidence-tests
-evidence-tests: $(VENV)/ready ## all tests that hazards.yaml names, into build/evidence_tests.xml for canbase evidence --tests; about an hour
+evidence-tests: $(VENV)/ready ## all tests that hazards.yaml names, into build/evidence_tests.xml for canbase prove evidence --tests; about an hour
 	mkdir -p build
 	pytest --numprocesses auto --timeout 600 --junitxml build/evidence_tests_own_time.xml $(addprefix $(TESTS)/,unit campaign)
 	CANBASE_EXIT_MATRIX=all pytest --junitxml build/evidence_tests_real_time.xml $(addprefix $(TESTS)/,bus ros)
@@ -148,14 +148,14 @@ exit-matrix: $(VENV)/ready ## every way out of a driving robot, for real, measur
 
 .PHONY: bench-quick
 bench-quick: $(VENV)/ready ## benchmarks of less than a minute; names what is slower than benchmarks/kept.json says
-	canbase benchmark --quick --compare benchmarks/kept.json
+	canbase prove benchmark --quick --compare benchmarks/kept.json
 
 .PHONY: bench
 bench: $(VENV)/ready ## every budget of this computer, measured beside a floor: docs/performance.md; NAME=reaction runs one
 ifdef NAME
-	canbase benchmark $(NAME)
+	canbase prove benchmark $(NAME)
 else
-	canbase benchmark --write docs/performance.md --json benchmarks/kept.json
+	canbase prove benchmark --write docs/performance.md --json benchmarks/kept.json
 endif
 
 .PHONY: pictures

@@ -1,4 +1,4 @@
-"""How exactly `canbase calibrate` finds wheel radii and track: simulated bases in a furnished room, in no time.
+"""How exactly `canbase setup calibrate` finds wheel radii and track: simulated bases in a furnished room, in no time.
 
     PYTHONPATH=virtual_bus_tests python benchmarks/calibration.py --bases 200 --write docs
 
@@ -134,7 +134,7 @@ def draw(robot: Robot, measured: Sequence[Measured], file: Path) -> None:
     figure, (before, after, errors) = plt.subplots(1, 3, figsize=(11.0, 3.6), layout="constrained")
     for axes, believed, title in (
         (before, wheels_of(robot.base), "Before"),
-        (after, one.found, "After canbase calibrate"),
+        (after, one.found, "After canbase setup calibrate"),
     ):
         _squares(axes, robot, believed, one.truth, title)
     for name in one.errors:

@@ -26,7 +26,7 @@ def read(path: Path) -> Mapping[str, float]:
         ratios = json.loads(path.read_text(encoding="utf-8"))["ratios"]
         return {str(what): float(ratio) for what, ratio in ratios.items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"{path} was not written by `canbase benchmark --json`: {error!r}") from error
+        raise ValueError(f"{path} was not written by `canbase prove benchmark --json`: {error!r}") from error
 
 
 def losses(figures: Sequence[Figure], before: Mapping[str, float]) -> list[str]:

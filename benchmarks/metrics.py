@@ -1,4 +1,5 @@
-"""What does `canbase metrics` cost: alone, scraped once a second, and in a storm? And what does the driver notice?
+"""What does `canbase serve metrics` cost: alone, scraped once a second, and in a storm? And what does the driver
+notice?
 
     ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST python benchmarks/metrics.py [--seconds 10] [--rounds 3]
 
@@ -115,7 +116,7 @@ def main() -> int:
         domain = held.enter_context(own_domain())
         robot = held.enter_context(robot_on(domain, changes=PATIENT))
         port = str(free_tcp_port())
-        process = robot.command("metrics", "--config", str(robot.config), "--port", port)
+        process = robot.command("serve", "metrics", "--config", str(robot.config), "--port", port)
         wait_for(url := f"http://127.0.0.1:{port}/metrics", robot)
         pids = {
             "canbase metrics": process.pid,

@@ -2,10 +2,11 @@
 
     python benchmarks/velocity_latency.py          # about 40 s; prints the table of docs/performance.md
 
-Five sources at 50 Hz and a scan of 720 points at 20 Hz come from one process; `canbase velocity` runs as it does on a
+Five sources at 50 Hz and a scan of 720 points at 20 Hz come from one process; `canbase serve velocity` runs as it
+does on a
 robot. The relay is a node in a process of its own with one subscription and one publisher, which receives the same
-commands. All three run with the real-time priority of `canbase velocity`. A command carries its number in its angular
-velocity, so each answer is matched to its question.
+commands. All three run with the real-time priority of `canbase serve velocity`. A command carries its number in its
+angular velocity, so each answer is matched to its question.
 """
 
 from __future__ import annotations
@@ -113,10 +114,10 @@ class Course(Node):
 def main() -> None:
     """Measures once and prints a table in Markdown."""
     prefer_udp(os.environ)
-    raise_priority("velocity")  # this process and the relay as `canbase velocity` itself
+    raise_priority("velocity")  # this process and the relay as `canbase serve velocity` itself
     with tempfile.TemporaryDirectory() as folder:
         config = robot_file(Path(folder))
-        velocity = subprocess.Popen([sys.executable, "-m", "canbase_cli", "velocity", "--config", str(config)])
+        velocity = subprocess.Popen([sys.executable, "-m", "canbase_cli", "serve", "velocity", "--config", str(config)])
         relay = subprocess.Popen([sys.executable, "-c", RELAY])
         try:
             report(*measure(velocity.pid, relay.pid))

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
+from canbase_config.load import sample
+from canbase_runtime.which_robot import VARIABLE
 from hazards.proof_rules import pytest_itemcollected as pytest_itemcollected
 from hazards.proof_rules import pytest_runtest_makereport as pytest_runtest_makereport
 from hazards.tested import pytest_collection_modifyitems as pytest_collection_modifyitems
@@ -16,6 +18,8 @@ from support.needs_root import pytest_runtest_setup as pytest_runtest_setup
 from support.second_run import pytest_sessionfinish as pytest_sessionfinish
 from support.second_run import pytest_terminal_summary as pytest_terminal_summary
 
+# What runs or is installed on this computer is no robot of the tests.
+os.environ[VARIABLE] = str(sample("bench"))
 # The same examples each time, on a slow machine too: a run judges the change before it, and says what failed as it was
 # drawn. HYPOTHESIS_PROFILE=default looks for new examples and makes a failing one as short as it can.
 settings.register_profile(

@@ -22,7 +22,7 @@ ROOT: Final = "canbase"
 _GENERIC: Final = "diagnostic_aggregator/GenericAnalyzer"
 _GROUP: Final = "diagnostic_aggregator/AnalyzerGroup"
 _HEADER: Final = """\
-# Parameters of diagnostic_aggregator for the robot {robot}, printed by canbase aggregator from its robot.yaml.
+# Parameters of diagnostic_aggregator for the robot {robot}, printed by canbase print aggregator from its robot.yaml.
 #   ros2 run diagnostic_aggregator aggregator_node --ros-args --params-file THIS_FILE
 # Several robots in one ROS graph: copy the block robot_{robot} of each file into one file.
 """

@@ -1,4 +1,4 @@
-"""What `canbase commission` has proven for a robot, and whether robot.yaml is still the same.
+"""What `canbase setup commission` has proven for a robot, and whether robot.yaml is still the same.
 
 A wheel radius that is a diameter, an inverted gear ratio, a wheel or both sides swapped: all parts,
 the watchdog too, compute with the same robot.yaml, and the drives agree with it. Only a person who looks at the wheels
@@ -31,7 +31,7 @@ Mark = Annotated[str, Field(pattern=rf"^[dspfi][0-9a-f]{{{DIGITS}}}$", max_lengt
 
 
 class Commissioned(Section):
-    """Written by `canbase commission`: for each step a mark of the values that it has shown; none: not done."""
+    """Written by `canbase setup commission`: for each step a mark of the values that it has shown; none: not done."""
 
     directions: Annotated[Mark | None, Field(description="which wheel turns which way")] = None
     scale: Annotated[Mark | None, Field(description="how far each wheel turns")] = None
@@ -60,7 +60,7 @@ def without_proof(robot: Robot) -> str:
         return ""
     why = _why_not_proven(robot)
     joints = ", ".join(drive.joint for drive in robot.drives)
-    return f"{joints}: {why}. With the wheels up: canbase commission --steps proof" if why else ""
+    return f"{joints}: {why}. With the wheels up: canbase setup commission --steps proof" if why else ""
 
 
 def kind_alone(robot: Robot) -> str:
@@ -73,7 +73,7 @@ def kind_alone(robot: Robot) -> str:
         return ""
     return (
         f"{', '.join(joints)}: 1018h:4 has no serial number, so the proof that it stops by itself is about its kind: "
-        "after each exchange of a drive repeat canbase commission --steps proof"
+        "after each exchange of a drive repeat canbase setup commission --steps proof"
     )
 
 

@@ -77,7 +77,8 @@ class Drive(Section):
         Field(
             strict=False,
             max_length=64,
-            description="objects that each boot compares; `canbase commission` notes here what units and polarity the "
+            description="objects that each boot compares; `canbase setup commission` notes here what "
+            "units and polarity the "
             "drive has",
         ),
     ] = ()

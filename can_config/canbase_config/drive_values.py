@@ -79,7 +79,7 @@ def misfit(values: Sequence[DriveValue], control_hz: float, motors: int, tpdos: 
         return (
             "its node turns two motors, whose feedback has all four TPDO identifiers of a node (180h, 280h, 380h and "
             "480h + id). Spare bytes behind feedback carry no values: the watchdog would read them as torque or "
-            "velocity. Take the values out, and read one by hand with `canbase sdo read "
+            "velocity. Take the values out, and read one by hand with `canbase bus sdo read "
             f"NODE {values[0].index:04X}:{values[0].sub}`"
         )
     spare = min(SPARE_TPDOS, tpdos - FIRST_SPARE_TPDO + 1)

@@ -20,7 +20,7 @@ DEFAULT_MARK: Final = "default"
 """The comment behind a value that the file does not give."""
 _MARK_COLUMN: Final = 44
 _IN_HEX: Final = frozenset(("index", "vendor_id", "product_code", "revision", "serial"))
-"""Keys whose numbers are those of a manual, an EDS or 1018h: hexadecimal, as `canbase commission` writes them."""
+"""Keys whose numbers are those of a manual, an EDS or 1018h: hexadecimal, as `canbase setup commission` writes them."""
 
 
 class _Representer(RoundTripRepresenter):

@@ -10,13 +10,13 @@ from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 
 _APART: Final[dict[str, Any]] = {"lease": {"socket"}, "black_box": {"folder"}, "commissioned": True}
-"""Not part of it: files of one computer, and the marks of `canbase commission`, which follow from the rest."""
+"""Not part of it: files of one computer, and the marks of `canbase setup commission`, which follow from the rest."""
 
 
 def configuration_sha256(robot: Robot) -> str:
     """SHA-256 in hex of the effective configuration, drive profiles included.
 
-    The same for the same robot on every computer, for every user, and before and after `canbase commission` has
+    The same for the same robot on every computer, for every user, and before and after `canbase setup commission` has
     written its marks and the drives' identities (1018h): those are compared one by one.
     """
     values = robot.model_dump(mode="json", exclude={**_APART, "drives": True})

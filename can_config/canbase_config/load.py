@@ -76,7 +76,7 @@ def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
     if why := uncommissioned(robot):
         place = file.place(("commissioned",) if ("commissioned",) in file.lines else ("drives",))
         limit = f"{uncommissioned_mps(robot):g} m/s (safety.uncommissioned_mps{_tenth(robot)})"
-        slow = f"until canbase commission it goes {limit}"
+        slow = f"until canbase setup commission it goes {limit}"
         yield Problem(place.file, place.line, place.key, f"{why}: {slow}")
     if robot.safety.require_self_stop and (why := without_proof(robot)):
         place = file.place(("safety", "require_self_stop"))

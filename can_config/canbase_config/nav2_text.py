@@ -1,4 +1,4 @@
-"""What `canbase nav2` prints: a parameter file of Nav2, alone or laid into Nav2's own, and a launch file."""
+"""What `canbase print nav2` prints: a parameter file of Nav2, alone or laid into Nav2's own, and a launch file."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ from canbase_config.yaml_file import read_yaml
 
 _PLUGIN: Final = ("controller_server", ROS, CONTROLLER, "plugin")
 _HEADER: Final = """\
-# Parameters of Nav2 for the robot {robot}, printed by canbase nav2 from its robot.yaml.
+# Parameters of Nav2 for the robot {robot}, printed by canbase print nav2 from its robot.yaml.
 # {how}
-# Nodes with a remapping beyond those of Nav2's own launch file (canbase nav2 --launch prints a launch file with them):
+# Nodes with a remapping beyond those of Nav2's own launch file (canbase print nav2 --launch prints a launch file with
+# them):
 {remappings}
 """
-_ALONE: Final = "Only what follows from robot.yaml; canbase nav2 --params FILE lays it into a parameter file of Nav2."
+_ALONE: Final = (
+    "Only what follows from robot.yaml; canbase print nav2 --params FILE lays it into a parameter file of Nav2."
+)
 _LAID: Final = "Laid into {file}."
 _LAUNCH: Final = '''\
-"""Nav2 for the robot {robot}: Nav2's own launch file with the remappings that canbase needs. Printed by canbase nav2.
+"""Nav2 for the robot {robot}: its own launch file with the remappings that canbase needs, by canbase print nav2.
 
     ros2 launch ./nav2.launch.py params_file:=nav2.yaml map:=map.yaml
 """
@@ -48,7 +51,7 @@ def generate_launch_description():
     nav2 = IncludeLaunchDescription(PythonLaunchDescriptionSource(path), launch_arguments=arguments.items())
     return LaunchDescription(
         [
-            DeclareLaunchArgument("params_file", description="what canbase nav2 --params has printed"),
+            DeclareLaunchArgument("params_file", description="what canbase print nav2 --params has printed"),
             DeclareLaunchArgument("namespace", default_value="{namespace}"),
             DeclareLaunchArgument("use_namespace", default_value="{uses}"),
             DeclareLaunchArgument("file", default_value="bringup_launch.py", description="or navigation_launch.py"),

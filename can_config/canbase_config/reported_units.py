@@ -2,7 +2,7 @@
 
 A unit that differs is invisible later: setpoint and measured velocity agree, and the wheel turns 10 times as fast. An
 object that contradicts robot.yaml is a `Misfit`. An object that is missing, 0 or 1/1, or whose unit has no fixed ratio
-to a revolution, does not show whether robot.yaml is right: `canbase commission` shows it, with the wheel.
+to a revolution, does not show whether robot.yaml is right: `canbase setup commission` shows it, with the wheel.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def _vector(values: list[str]) -> str:
 
 
 _TEMPLATE: Final = """\
-# Parameters of robot_localization's ekf_node for the robot {robot}, printed by canbase ekf from its robot.yaml.
+# Parameters of robot_localization's ekf_node for the robot {robot}, printed by canbase print ekf from its robot.yaml.
 # ros2 run robot_localization ekf_node --ros-args --params-file ekf.yaml
 /**/ekf_filter_node:
   ros__parameters:

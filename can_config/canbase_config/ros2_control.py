@@ -103,7 +103,7 @@ def controllers(robot: Robot) -> str:
 
 
 _TEMPLATE: Final = """\
-# Printed by canbase urdf --controllers: {controller} with the wheels and limits of robot.yaml.
+# Printed by canbase print urdf --controllers: {controller} with the wheels and limits of robot.yaml.
 controller_manager:
   ros__parameters:
     update_rate: {update_hz}                  # rates.command_hz

@@ -133,14 +133,15 @@ class Safety(Section):
         Field(
             ge=0.02,
             le=5.0,
-            description="speed limit until canbase commission has finished all steps, and at most a tenth of "
+            description="speed limit until canbase setup commission has finished all steps, and at most a tenth of "
             "limits.linear_mps until its step scale has proven the units of the drives [m/s]",
         ),
     ] = 0.3
     require_self_stop: Annotated[
         bool,
         Field(
-            description="true: no power before canbase commission has proven, with these drives, that each one stops "
+            description="true: no power before canbase setup commission has proven, with these drives, "
+            "that each one stops "
             "by itself when this computer fails; false: STO has to stop those that do not"
         ),
     ] = False

@@ -1,7 +1,7 @@
 """Objects that decide what one bit of 60FFh, 606Ch, 6064h and of the ramps means, and which way is positive. CiA 402-2.
 
 The drives keep them, and all parts of canbase believe them: a drive that has lost one agrees with itself, and turns its
-wheel at another speed, or the other way. So `canbase commission` notes them, and each boot compares.
+wheel at another speed, or the other way. So `canbase setup commission` notes them, and each boot compares.
 """
 
 from __future__ import annotations

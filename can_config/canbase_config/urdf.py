@@ -38,7 +38,7 @@ def urdf(robot: Robot) -> str:
     radius_m = robot.base.wheel_radius_m
     root = ElementTree.Element("robot", name=robot.name)
     root.append(
-        ElementTree.Comment(" Printed by canbase urdf. Heights, and wheels' x, are not in robot.yaml: chosen. ")
+        ElementTree.Comment(" Printed by canbase print urdf. Heights, and wheels' x, are not in robot.yaml: chosen. ")
     )
     for name, rgba in COLOURS.items():
         ElementTree.SubElement(ElementTree.SubElement(root, "material", name=name), "color", rgba=rgba)

@@ -1,4 +1,4 @@
-"""`canbase adopt`: drives fresh from the box get node ids and a bit rate."""
+"""`canbase bus adopt`: drives fresh from the box get node ids and a bit rate."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from canbase_runtime.terminal import WRONG_INPUT, fail
 
 EPILOG: Final = (
     "Examples:  \n"
-    "sudo canbase adopt --channel can0 --set-link  \n"
-    "canbase adopt --config robot.yaml  \n"
-    "canbase adopt --channel can0 --bitrate 500000 --present-bitrate 125000"
+    "sudo canbase bus adopt --channel can0 --set-link  \n"
+    "canbase bus adopt --config robot.yaml  \n"
+    "canbase bus adopt --channel can0 --bitrate 500000 --present-bitrate 125000"
 )
 
 

@@ -1,4 +1,4 @@
-"""`canbase aggregator`: the parameters of diagnostic_aggregator for a robot.yaml."""
+"""`canbase print aggregator`: the parameters of diagnostic_aggregator for a robot.yaml."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def aggregator(
 ) -> None:
     """Print parameters of diagnostic_aggregator: the groups of /diagnostics, and what must be there.
 
-    For example: canbase aggregator robot.yaml > aggregator.yaml
+    For example: canbase print aggregator robot.yaml > aggregator.yaml
 
     An entry that does not come makes its group an error. deploy/diagnostics/aggregator.yaml is that of the bench.
 

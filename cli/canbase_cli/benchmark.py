@@ -1,4 +1,4 @@
-"""`canbase benchmark`: the benchmarks of the sources. An installation has none: they need the simulated robot."""
+"""`canbase prove benchmark`: the benchmarks of the sources. An installation has none: they need the simulated robot."""
 
 from __future__ import annotations
 

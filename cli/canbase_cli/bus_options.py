@@ -17,7 +17,12 @@ InterfaceOption = Annotated[
 ]
 ChannelOption = Annotated[
     str | None,
-    typer.Option("--channel", metavar="NAME", help="Such as can0; replaces that of robot.yaml.", show_default="can0"),
+    typer.Option(
+        "--channel",
+        metavar="NAME",
+        help="Such as can0; replaces that of robot.yaml.",
+        show_default="can0 with --interface",
+    ),
 ]
 BitrateOption = Annotated[
     int | None,

@@ -1,4 +1,4 @@
-"""`canbase calibrate`: wheel radii and track by squares in both directions, measured with the scanner."""
+"""`canbase setup calibrate`: wheel radii and track by squares in both directions, measured with the scanner."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from canbase_commissioning.umbmark.squares import Course
     from canbase_config.robot import Robot
 
-EPILOG: Final = "Examples:  \ncanbase calibrate robot.yaml  \ncanbase calibrate robot.yaml --side 2 --squares 3 --write"
+EPILOG: Final = (
+    "Examples:  \ncanbase setup calibrate robot.yaml  \ncanbase setup calibrate robot.yaml --side 2 --squares 3 --write"
+)
 
 
 def calibrate(
@@ -141,6 +143,7 @@ def _write(config: Path, robot: Robot, edits: list[Edit]) -> None:
     typer.echo("Restart canbase: its parts still run with the old values")
     if uncommissioned(with_edits(robot, edits)):
         typer.echo(
-            "The mark of commissioning does not fit to the new values: run canbase commission --steps floor --config "
+            "The mark of commissioning does not fit to the new values: run canbase setup commission "
+            "--steps floor --config "
             f"{config}. Until then safety.uncommissioned_mps limits the speed"
         )

@@ -1,4 +1,5 @@
-"""The ROS side of `canbase calibrate`: drives the squares by the ordinary actions, and records wheels and scans."""
+"""The ROS side of `canbase setup calibrate`: drives the squares by the ordinary actions, and records wheels and
+scans."""
 
 from __future__ import annotations
 

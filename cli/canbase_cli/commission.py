@@ -1,4 +1,4 @@
-"""`canbase commission`: guided first motion, and the proof that the drives stop by themselves."""
+"""`canbase setup commission`: guided first motion, and the proof that the drives stop by themselves."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from canbase_runtime.terminal import WRONG_INPUT, fail
 
 EPILOG: Final = (
     "Examples:  \n"
-    "canbase commission --config robot.yaml  \n"
-    "canbase commission --config robot.yaml --steps proof      (again, after a change of firmware)  \n"
-    "canbase commission --config robot.yaml --answers answers.yaml --yes --dry-run"
+    "canbase setup commission --config robot.yaml  \n"
+    "canbase setup commission --config robot.yaml --steps proof      (again, after a change of firmware)  \n"
+    "canbase setup commission --config robot.yaml --answers answers.yaml --yes --dry-run"
 )
 STEPS: Final = ("directions", "scale", "proof", "floor")
 
@@ -86,7 +86,7 @@ def commission(
     if report is not None and report.exists():
         fail(f"{report} exists; a report is never overwritten: give --report another name", WRONG_INPUT)
     if not config.exists():
-        fail(f"{config} does not exist: canbase init writes one", WRONG_INPUT)
+        fail(f"{config} does not exist: canbase setup init writes one", WRONG_INPUT)
     plan = Plan(
         frozenset(steps.split(",")),
         speed_mps,

@@ -1,4 +1,4 @@
-"""Shell completion by Tab: names from the robot.yaml that is named earlier on the line, or the bench sample.
+"""Shell completion by Tab: names from the robot.yaml that is named earlier on the line, or of the robot that is meant.
 
 A robot.yaml that cannot be read proposes nothing: the command itself reports what is wrong in it.
 """
@@ -59,9 +59,10 @@ def one_more_of(words: tuple[str, ...], incomplete: str) -> list[str]:
 
 def _robot(ctx: typer.Context) -> Robot | None:
     from canbase_config.errors import ConfigError
-    from canbase_config.load import load_robot, sample
+    from canbase_config.load import load_robot
+    from canbase_runtime.which_robot import NoRobotError, which_robot
 
     try:
-        return load_robot(ctx.params.get("config") or sample("bench")).robot
-    except ConfigError:
+        return load_robot(which_robot(ctx.params.get("config")).path).robot
+    except (ConfigError, NoRobotError):
         return None

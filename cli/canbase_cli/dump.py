@@ -1,4 +1,4 @@
-"""`canbase dump`: the frames of a bus as they come, in words. It sends nothing."""
+"""`canbase bus dump`: the frames of a bus as they come, in words. It sends nothing."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from canbase_recording.kind import Kind
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail
 
 EPILOG: Final = (
-    "Examples:  \ncanbase dump --channel can0  \ncanbase dump --config robot.yaml --node 1 --kind emcy --kind sdo  \n"
-    "canbase dump | head -100"
+    "Examples:  \ncanbase bus dump --channel can0  \ncanbase bus dump --config robot.yaml --node 1 "
+    "--kind emcy --kind sdo  \n"
+    "canbase bus dump | head -100"
 )
 
 

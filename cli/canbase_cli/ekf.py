@@ -1,4 +1,4 @@
-"""`canbase ekf`: parameters of robot_localization for the base of a robot.yaml."""
+"""`canbase print ekf`: parameters of robot_localization for the base of a robot.yaml."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def ekf(
 ) -> None:
     """Print the parameters of robot_localization's ekf_node: odom and the yaw rate of an IMU become one pose.
 
-    For example: canbase ekf robot.yaml > ekf.yaml
+    For example: canbase print ekf robot.yaml > ekf.yaml
 
     The filter then publishes odom_frame → base_frame, so robot.yaml needs odometry.publish_tf: false. What is missing
     is reported on stderr. docs/odometry.md explains the parameters.

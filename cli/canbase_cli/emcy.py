@@ -1,4 +1,4 @@
-"""`canbase emcy`: the errors that a drive has and remembers, in words; and it forgets them on request."""
+"""`canbase bus emcy`: the errors that a drive has and remembers, in words; and it forgets them on request."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOptio
 from canbase_cli.options import ConfigOption
 from canbase_cli.sdo import NodeArgument
 
-EPILOG: Final = "Examples:  \ncanbase emcy 1 --config robot.yaml  \ncanbase emcy 1 --clear --channel can0"
+EPILOG: Final = "Examples:  \ncanbase bus emcy 1 --config robot.yaml  \ncanbase bus emcy 1 --clear --channel can0"
 
 
 def emcy(

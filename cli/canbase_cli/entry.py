@@ -15,9 +15,10 @@ def main() -> None:
     filter_output()
     # Plugins of pydantic would be code of others in each service, and are looked for in all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
-    if sys.argv[1:2] and sys.argv[1] in SERVICES:
-        app = new_app()
-        add_services(app)
+    if sys.argv[1:2] == ["serve"] and sys.argv[2:3] and sys.argv[2] in SERVICES:
+        app, serve = new_app(), new_app()
+        add_services(serve)
+        app.add_typer(serve, name="serve")
     else:
         from canbase_cli.main import app
     app(prog_name="canbase")

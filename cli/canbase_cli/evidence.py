@@ -1,4 +1,5 @@
-"""`canbase evidence`: what is known about the stops of a robot, in one folder; and whether that folder was changed."""
+"""`canbase prove evidence`: what is known about the stops of a robot, in one folder; and whether that folder was
+changed."""
 
 from __future__ import annotations
 
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
 INCOMPLETE: Final = 3
 """Exit code: the folder is written, and something is missing, has failed or does not belong to this robot."""
 EPILOG: Final = (
-    "Examples:  \ncanbase evidence robot.yaml --qualification qualification/ --tests tests.xml --recordings ~/stops  \n"
-    "canbase evidence --check evidence-robot-20261124-201500"
+    "Examples:  \ncanbase prove evidence robot.yaml --qualification qualification/ --tests tests.xml "
+    "--recordings ~/stops  \n"
+    "canbase prove evidence --check evidence-robot-20261124-201500"
 )
 
 
@@ -33,7 +35,7 @@ def evidence(
         ),
     ] = None,
     qualification: Annotated[
-        Path | None, typer.Option("--qualification", metavar="FOLDER", help="Results of canbase qualify.")
+        Path | None, typer.Option("--qualification", metavar="FOLDER", help="Results of canbase prove qualify.")
     ] = None,
     tests: Annotated[
         list[Path] | None,
@@ -48,13 +50,15 @@ def evidence(
         typer.Option(
             "--commissioning",
             metavar="FILE",
-            help="Report of canbase commission; repeatable.",
+            help="Report of canbase setup commission; repeatable.",
             show_default="those beside ROBOT.YAML",
         ),
     ] = None,
     scan: Annotated[
         Path | None,
-        typer.Option("--scan", metavar="FILE", help="Output of canbase scan --json: the drives that are wired now."),
+        typer.Option(
+            "--scan", metavar="FILE", help="Output of canbase bus scan --json: the drives that are wired now."
+        ),
     ] = None,
     check: Annotated[
         Path | None, typer.Option("--check", metavar="FOLDER", help="Find files that were changed, added or removed.")

@@ -47,7 +47,10 @@ RecordingConfig = Annotated[
 
 def explain(
     recording: Annotated[
-        Path, typer.Argument(metavar="FILE", help="ASC (a black box), candump -L, BLF, TRC, or MCAP of canbase export.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="ASC (a black box), candump -L, BLF, TRC, or MCAP of canbase record export."
+        ),
     ],
     config: RecordingConfig = None,
     html: Annotated[

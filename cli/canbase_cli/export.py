@@ -1,4 +1,4 @@
-"""`canbase export`: a recording of a CAN bus as ROS messages, for Foxglove and PlotJuggler."""
+"""`canbase record export`: a recording of a CAN bus as ROS messages, for Foxglove and PlotJuggler."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from canbase_cli.explain import ChannelOfFile, RecordingConfig, recorded_robot
 from canbase_cli.options import ros_needed
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
-EPILOG: Final = "For example: canbase export stop.asc --config robot.yaml --mcap stop.mcap"
+EPILOG: Final = "For example: canbase record export stop.asc --config robot.yaml --mcap stop.mcap"
 
 
 def export(
@@ -38,7 +38,7 @@ def export(
         except ModuleNotFoundError as error:
             if error.name != "mcap":
                 raise
-            fail("canbase export needs the Python package mcap: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
+            fail("canbase record export needs the Python package mcap: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
     from canbase_recording.recording_file import NoRecordingError
 
     try:

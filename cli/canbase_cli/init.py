@@ -1,4 +1,4 @@
-"""`canbase init`: a robot.yaml from the drives on a bus."""
+"""`canbase setup init`: a robot.yaml from the drives on a bus."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOptio
 
 EPILOG: Final = (
     "Examples:  \n"
-    "canbase init --channel can0  \n"
-    "canbase init --interface slcan --channel /dev/ttyACM0 --bitrate 500000 --output robot.yaml  \n"
-    "canbase init --config robot.yaml --output new.yaml      (the same bus; on a bench while canbase sim runs)"
+    "canbase setup init --channel can0  \n"
+    "canbase setup init --interface slcan --channel /dev/ttyACM0 --bitrate 500000 --output robot.yaml  \n"
+    "canbase setup init --config robot.yaml --output new.yaml      (the same bus; on a bench while canbase sim runs)"
 )
 
 
@@ -45,7 +45,7 @@ def init(
     It listens first, and ends if another master is on the bus. Then it reads identity, encoder resolution and gear
     ratio of every drive by SDO, which changes nothing. It asks for what no drive reports: sides, wheels, edges, speed.
     A bare Enter takes the proposed answer. The file passes `canbase config check`; an existing file is kept. Drives
-    fresh from the box often have one node id all, or another bit rate: `canbase adopt` comes first for them.
+    fresh from the box often have one node id all, or another bit rate: `canbase bus adopt` comes first for them.
 
     Exit codes: 0 written, 1 no drives, another master or values that do not fit, 2 wrong command line.
     """

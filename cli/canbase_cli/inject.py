@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from canbase_cli.options import ConfigOption
+from canbase_cli.options import BenchOption, ConfigOption, named
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def inject(
         list[str] | None, typer.Argument(metavar="[NAME=VALUE]…", help="Parameters of a drive's fault.")
     ] = None,
     config: ConfigOption = None,
+    bench: BenchOption = False,
 ) -> None:
     """Cause one failure on a simulated robot while `canbase up` runs. Refused on a real bus.
 
@@ -56,7 +57,7 @@ def inject(
 
     Exit codes: 0 done, 1 the target does not run or the simulator refuses, 2 wrong command line or robot.yaml.
     """
-    robot = load_config(config).robot
+    robot = load_config(named(config, bench=bench)).robot
     if robot.bus.interface not in SIMULATED:
         fail(f"{robot.name} is on {robot.bus.interface}: faults are injected on a simulated bus alone", WRONG_INPUT)
     if target in PARTS:

@@ -1,4 +1,5 @@
-"""`canbase install` and `canbase uninstall`: a robot's services on this computer. What they are: canbase_deploy."""
+"""`canbase setup install` and `canbase setup uninstall`: a robot's services on this computer. What they are:
+canbase_deploy."""
 
 from __future__ import annotations
 
@@ -139,7 +140,7 @@ def _installed(path: Path) -> Loaded:
         return load_config(path)
     except typer.Exit:
         if path.is_file():
-            advice = f"Write into a copy of {path} what is missing, then: sudo canbase install --config COPY."
+            advice = f"Write into a copy of {path} what is missing, then: sudo canbase setup install --config COPY."
             typer.echo(f"{UNCHANGED} {advice}", err=True)
         raise
 

@@ -1,4 +1,4 @@
-"""`canbase jog`: turns one wheel, slowly, while a key is held."""
+"""`canbase bus jog`: turns one wheel, slowly, while a key is held."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from canbase_cli import completion
 from canbase_cli.options import ConfigOption
 
 EPILOG: Final = (
-    "Examples:  \ncanbase jog left_wheel --config robot.yaml  \n"
-    "canbase jog right_wheel --config robot.yaml --speed 0.02"
+    "Examples:  \ncanbase bus jog left_wheel --config robot.yaml  \n"
+    "canbase bus jog right_wheel --config robot.yaml --speed 0.02"
 )
 
 

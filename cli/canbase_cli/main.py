@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -48,10 +48,11 @@ from canbase_cli import (
     web,
 )
 from canbase_cli.goal import GoalCommand
+from canbase_cli.old_names import OldNames
 from canbase_cli.options import ROS_USAGE, RosCommand, new_app
 from canbase_doctor import support_bundle
 
-app = new_app()
+app = new_app(OldNames)
 
 
 def _version(wanted: bool) -> None:
@@ -77,58 +78,71 @@ def canbase(
 
 _DRIVE: Final = "Drive"
 _LOOK: Final = "Monitor and diagnose"
-_SET_UP: Final = "Set up"
-_LEARN: Final = "Learn and measure"
+_GROUPS: Final = "More, by subject: `canbase GROUP --help`"
+_ROS: Final[dict[str, Any]] = {"cls": RosCommand, "options_metavar": ROS_USAGE}
+_GOAL: Final[dict[str, Any]] = {"cls": GoalCommand, "options_metavar": ROS_USAGE}
 
 app.command("demo", rich_help_panel=_DRIVE)(demo.demo)
-app.command("up", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(up.up)
-app.command("drive", cls=GoalCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(drive.drive)
-app.command("rotate", cls=GoalCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(rotate.rotate)
-app.command("cancel", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(cancel.cancel)
-app.command("stop", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(trigger.stop)
-app.command("reset", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_DRIVE)(trigger.reset)
+app.command("up", **_ROS, rich_help_panel=_DRIVE)(up.up)
+app.command("drive", **_GOAL, rich_help_panel=_DRIVE)(drive.drive)
+app.command("rotate", **_GOAL, rich_help_panel=_DRIVE)(rotate.rotate)
+app.command("cancel", **_ROS, rich_help_panel=_DRIVE)(cancel.cancel)
+app.command("stop", **_ROS, rich_help_panel=_DRIVE)(trigger.stop)
+app.command("reset", **_ROS, rich_help_panel=_DRIVE)(trigger.reset)
 
-app.command("monitor", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(monitor.monitor)
-app.command("web", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(web.web)
-app.command("metrics", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(metrics.metrics)
-app.command("vda5050", cls=RosCommand, options_metavar=ROS_USAGE, rich_help_panel=_LOOK)(vda5050.vda5050)
-app.command("record", cls=RosCommand, options_metavar=ROS_USAGE, epilog=record.EPILOG, rich_help_panel=_LOOK)(
-    record.record
-)
-app.command("doctor", cls=RosCommand, options_metavar=ROS_USAGE, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(
-    doctor.doctor
-)
+app.command("monitor", **_ROS, rich_help_panel=_LOOK)(monitor.monitor)
+app.command("web", **_ROS, rich_help_panel=_LOOK)(web.web)
+app.command("doctor", **_ROS, epilog=doctor.EPILOG, rich_help_panel=_LOOK)(doctor.doctor)
 app.command("explain", epilog=explain.EPILOG, rich_help_panel=_LOOK)(explain.explain)
-app.command("dump", epilog=dump.EPILOG, rich_help_panel=_LOOK)(dump.dump)
-app.command("export", epilog=export.EPILOG, rich_help_panel=_LOOK)(export.export)
-app.command("replay", epilog=replay.EPILOG, rich_help_panel=_LOOK)(replay.replay)
-app.command("evidence", epilog=evidence.EPILOG, rich_help_panel=_LOOK)(evidence.evidence)
-app.command("support-bundle", rich_help_panel=_LOOK)(support_bundle.support_bundle)
+app.command("inject", epilog=inject.EPILOG, rich_help_panel=_LOOK)(inject.inject)
 
-app.command("adopt", epilog=adopt.EPILOG, rich_help_panel=_SET_UP)(adopt.adopt)
-app.command("init", epilog=init.EPILOG, rich_help_panel=_SET_UP)(init.init)
-app.command("sample", rich_help_panel=_SET_UP)(sample.sample)
-app.add_typer(config.app, name="config", rich_help_panel=_SET_UP)
-app.command("urdf", rich_help_panel=_SET_UP)(urdf.urdf)
-app.command("nav2", rich_help_panel=_SET_UP)(nav2.nav2)
-app.command("aggregator", rich_help_panel=_SET_UP)(aggregator.aggregator)
-app.command("ekf", rich_help_panel=_SET_UP)(ekf.ekf)
-app.command("qualify", epilog=qualify.EPILOG, rich_help_panel=_SET_UP)(qualify.qualify)
-app.command("scan", epilog=scan.EPILOG, rich_help_panel=_SET_UP)(scan.scan)
-app.add_typer(sdo.app, name="sdo", rich_help_panel=_SET_UP)
-app.add_typer(params.app, name="params", rich_help_panel=_SET_UP)
-app.command("emcy", epilog=emcy.EPILOG, rich_help_panel=_SET_UP)(emcy.emcy)
-app.command("nmt", epilog=nmt.EPILOG, rich_help_panel=_SET_UP)(nmt.nmt)
-app.command("jog", epilog=jog.EPILOG, rich_help_panel=_SET_UP)(jog.jog)
-app.command("commission", epilog=commission.EPILOG, rich_help_panel=_SET_UP)(commission.commission)
-app.command("calibrate", cls=RosCommand, options_metavar=ROS_USAGE, epilog=calibrate.EPILOG, rich_help_panel=_SET_UP)(
-    calibrate.calibrate
-)
-app.command("install", rich_help_panel=_SET_UP)(install.install)
-app.command("uninstall", rich_help_panel=_SET_UP)(install.uninstall)
 
-app.add_typer(fibonacci.app, name="fibonacci", rich_help_panel=_LEARN)
-app.command("inject", epilog=inject.EPILOG, rich_help_panel=_LEARN)(inject.inject)
-app.command("benchmark", rich_help_panel=_LEARN)(benchmark.benchmark)
+def _group(name: str, about: str) -> typer.Typer:
+    group = typer.Typer(help=about, no_args_is_help=True)
+    app.add_typer(group, name=name, rich_help_panel=_GROUPS)
+    return group
 
-services.add_services(app)
+
+_setup = _group("setup", "From new drives to installed services: init, commission, calibrate, install.")
+_setup.command("init", epilog=init.EPILOG)(init.init)
+_setup.command("commission", epilog=commission.EPILOG)(commission.commission)
+_setup.command("calibrate", **_ROS, epilog=calibrate.EPILOG)(calibrate.calibrate)
+_setup.command("install")(install.install)
+_setup.command("uninstall")(install.uninstall)
+
+app.add_typer(config.app, name="config", rich_help_panel=_GROUPS)
+
+_bus = _group("bus", "The CAN bus and the drives on it: scan, dump, sdo, params, nmt, emcy, jog, adopt.")
+_bus.command("scan", epilog=scan.EPILOG)(scan.scan)
+_bus.command("dump", epilog=dump.EPILOG)(dump.dump)
+_bus.add_typer(sdo.app, name="sdo")
+_bus.add_typer(params.app, name="params")
+_bus.command("nmt", epilog=nmt.EPILOG)(nmt.nmt)
+_bus.command("emcy", epilog=emcy.EPILOG)(emcy.emcy)
+_bus.command("jog", epilog=jog.EPILOG)(jog.jog)
+_bus.command("adopt", epilog=adopt.EPILOG)(adopt.adopt)
+
+_print = _group("print", "Files for other programs, printed: a sample robot.yaml, URDF, parameters of Nav2.")
+_print.command("sample")(sample.sample)
+_print.command("urdf")(urdf.urdf)
+_print.command("nav2")(nav2.nav2)
+_print.command("ekf")(ekf.ekf)
+_print.command("aggregator")(aggregator.aggregator)
+
+_record = _group("record", "Recordings: start one, replay it, export it, and the bundle for remote help.")
+_record.command("start", **_ROS, epilog=record.EPILOG)(record.record)
+_record.command("replay", epilog=replay.EPILOG)(replay.replay)
+_record.command("export", epilog=export.EPILOG)(export.export)
+_record.command("bundle")(support_bundle.support_bundle)
+
+_prove = _group("prove", "Evidence: qualify a robot in simulation, gather the evidence for one, measure canbase.")
+_prove.command("qualify", epilog=qualify.EPILOG)(qualify.qualify)
+_prove.command("evidence", epilog=evidence.EPILOG)(evidence.evidence)
+_prove.command("benchmark")(benchmark.benchmark)
+
+_serve = _group("serve", "One process each: the components that `canbase up` starts, and servers for a fleet.")
+services.add_services(_serve)
+_serve.command("metrics", **_ROS)(metrics.metrics)
+_serve.command("vda5050", **_ROS)(vda5050.vda5050)
+
+app.add_typer(fibonacci.app, name="fibonacci", rich_help_panel=_GROUPS)

@@ -1,4 +1,4 @@
-"""`canbase metrics`: what a running robot does, for Prometheus and everything that reads OpenMetrics."""
+"""`canbase serve metrics`: what a running robot does, for Prometheus and everything that reads OpenMetrics."""
 
 from __future__ import annotations
 

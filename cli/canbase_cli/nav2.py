@@ -1,4 +1,4 @@
-"""`canbase nav2`: the parameters and remappings that Nav2 needs on the base of a robot.yaml."""
+"""`canbase print nav2`: the parameters and remappings that Nav2 needs on the base of a robot.yaml."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def nav2(
 ) -> None:
     """Print what Nav2 needs for this robot: parameters (limits, footprint, frames, topics), or a launch file.
 
-    For example: canbase nav2 robot.yaml --params nav2_params.yaml > nav2.yaml
+    For example: canbase print nav2 robot.yaml --params nav2_params.yaml > nav2.yaml
 
     The launch file includes Nav2's own and adds remappings, so that Nav2's velocities reach the mux, and never the
     driver. What is missing in robot.yaml is reported on stderr. canbase doctor checks the running system.
@@ -46,7 +46,7 @@ def nav2(
         raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
     if launch and params is not None:
         raise typer.BadParameter(
-            "--launch prints no parameters: call canbase nav2 once with --params, once with --launch"
+            "--launch prints no parameters: call canbase print nav2 once with --params, once with --launch"
         )
     robot = load_config(config or file, quiet=True).robot
     try:

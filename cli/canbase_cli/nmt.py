@@ -1,4 +1,4 @@
-"""`canbase nmt`: sends one NMT command to a node or to all, and shows what it does to the motors."""
+"""`canbase bus nmt`: sends one NMT command to a node or to all, and shows what it does to the motors."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from canbase_cli.bus_options import BitrateOption, ChannelOption, InterfaceOptio
 from canbase_cli.options import ConfigOption
 
 EPILOG: Final = (
-    "Examples:  \ncanbase nmt 1 reset --config robot.yaml  \ncanbase nmt all preop --channel can0  \n"
-    "canbase nmt 2 start --channel can0"
+    "Examples:  \ncanbase bus nmt 1 reset --config robot.yaml  \ncanbase bus nmt all preop --channel can0  \n"
+    "canbase bus nmt 2 start --channel can0"
 )
 ALL: Final = "all"
 

@@ -1,4 +1,4 @@
-"""`canbase params`: the parameters of a drive in a file: saved, compared, restored; stored in the drive, reset."""
+"""`canbase bus params`: the parameters of a drive in a file: saved, compared, restored; stored in the drive, reset."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from canbase_cli.sdo import NodeArgument
 app = typer.Typer(help="Save, compare and restore the parameters of a drive.", no_args_is_help=True)
 
 SAVE_EPILOG: Final = (
-    "Example:  \ncanbase params save 1 --eds maker.eds left.dcf --config robot.yaml"
+    "Example:  \ncanbase bus params save 1 --eds maker.eds left.dcf --config robot.yaml"
 )  # fmt: skip
 DIFF_EPILOG: Final = (
-    "Examples:  \ncanbase params diff left.dcf 1 --config robot.yaml      (what has changed since)  \n"
-    "canbase params diff 1 2 --eds maker.eds --channel can0  (two drives)  \n"
-    "canbase params diff left.dcf boot --config robot.yaml   (what canbase sets at its start)  \n"
-    "canbase params diff maker.eds 1 --channel can0          (against the maker's defaults)"
+    "Examples:  \ncanbase bus params diff left.dcf 1 --config robot.yaml      (what has changed since)  \n"
+    "canbase bus params diff 1 2 --eds maker.eds --channel can0  (two drives)  \n"
+    "canbase bus params diff left.dcf boot --config robot.yaml   (what canbase sets at its start)  \n"
+    "canbase bus params diff maker.eds 1 --channel can0          (against the maker's defaults)"
 )
 RESTORE_EPILOG: Final = (
-    "Examples:  \ncanbase params restore left.dcf --config robot.yaml  \n"
-    "canbase params restore left.dcf --node 2 --channel can0   (COB-IDs move with the node id)"
+    "Examples:  \ncanbase bus params restore left.dcf --config robot.yaml  \n"
+    "canbase bus params restore left.dcf --node 2 --channel can0   (COB-IDs move with the node id)"
 )
 
 
@@ -109,7 +109,7 @@ def diff(
 
 @app.command("restore", epilog=RESTORE_EPILOG)
 def restore(
-    file: Annotated[Path, typer.Argument(metavar="FILE.dcf", help="From canbase params save.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE.dcf", help="From canbase bus params save.", show_default=False)],
     config: ConfigOption = None,
     interface: InterfaceOption = None,
     channel: ChannelOption = None,
@@ -180,7 +180,7 @@ def defaults(
 ) -> None:
     """Give the drive its maker's parameters back, with its next reset (1011h, "load").
 
-    Save them first: canbase params save. Refused under the conditions of restore.
+    Save them first: canbase bus params save. Refused under the conditions of restore.
 
     Exit codes: 0 ordered, 1 refused or no answer, 2 wrong command line.
     """

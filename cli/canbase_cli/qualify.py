@@ -1,4 +1,4 @@
-"""`canbase qualify`: failures of the user's own robot.yaml in virtual time, many of them, before it drives."""
+"""`canbase prove qualify`: failures of the user's own robot.yaml in virtual time, many of them, before it drives."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 BROKEN_OFF: Final = 128 + signal.SIGINT
 """Exit code after Ctrl-C, as of a shell."""
 EPILOG: Final = (
-    "Examples:  \ncanbase qualify robot.yaml  \n"
-    "canbase qualify robot.yaml --scenarios 10000 --payload 1..3 --slope 0.05  \n"
-    "canbase qualify robot.yaml --resume  \ncanbase qualify robot.yaml --scenario 637  \n"
-    "canbase qualify robot.yaml --report"
+    "Examples:  \ncanbase prove qualify robot.yaml  \n"
+    "canbase prove qualify robot.yaml --scenarios 10000 --payload 1..3 --slope 0.05  \n"
+    "canbase prove qualify robot.yaml --resume  \ncanbase prove qualify robot.yaml --scenario 637  \n"
+    "canbase prove qualify robot.yaml --report"
 )
 LEAST, MOST = 0.1, 20.0
 """Of a payload."""
@@ -200,7 +200,7 @@ class _Qualify:
         from canbase_qualification.results_file import ResultsError, ResultsFile
         from canbase_qualification.worker import WorkerDiedError, WorkError
 
-        again = f"canbase qualify {self._loaded.path} --out {self._folder} --resume goes on"
+        again = f"canbase prove qualify {self._loaded.path} --out {self._folder} --resume goes on"
         try:
             job, about = self._prepared(resume=resume)
             with ResultsFile(self._folder) as results:

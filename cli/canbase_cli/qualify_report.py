@@ -1,4 +1,5 @@
-"""The end of `canbase qualify`, and `canbase qualify --report`: writes the report of a folder of results."""
+"""The end of `canbase prove qualify`, and `canbase prove qualify --report`: writes the report of a folder of
+results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`canbase record`: the last seconds of the black box, or every topic of the ROS graph as MCAP.
+"""`canbase record start`: the last seconds of the black box, or every topic of the ROS graph as MCAP.
 
 This file records topics; record_black_box.py has the other half.
 """
@@ -26,8 +26,8 @@ TURN_S: Final = 0.2
 
 EPILOG: Final = (
     "Examples:  \ncanbase record                    the last seconds, into the folder of the black box  \n"
-    "canbase record --seconds 5 --out turn.asc;  canbase explain turn.asc  \n"
-    "canbase record --mcap run.mcap    every topic until Ctrl-C"
+    "canbase record start --seconds 5 --out turn.asc;  canbase explain turn.asc  \n"
+    "canbase record start --mcap run.mcap    every topic until Ctrl-C"
 )
 
 
@@ -90,7 +90,7 @@ def _record_topics(
     try:
         from canbase_recording.mcap_file import McapFile
     except ModuleNotFoundError as error:
-        fail(f"canbase record needs the Python package {error.name}: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
+        fail(f"canbase record start needs the Python package {error.name}: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
     ended = end_signals()
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:

@@ -1,4 +1,4 @@
-"""`canbase record` without --mcap: the motor driver writes what its black box has of the last seconds."""
+"""`canbase record start` without --mcap: the motor driver writes what its black box has of the last seconds."""
 
 from __future__ import annotations
 

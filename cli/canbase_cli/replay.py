@@ -1,4 +1,4 @@
-"""`canbase replay`: a recorded stop once more, through the real watchdog, and with another robot.yaml."""
+"""`canbase record replay`: a recorded stop once more, through the real watchdog, and with another robot.yaml."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from canbase_recording.velocity_inputs import VelocityInputs
 
 EPILOG: Final = (
-    "Examples:  \ncanbase replay stop_robot_20261124T201500.000Z_watchdog_tripped.asc  \n"
-    "canbase replay stop.asc --config shorter_lease.yaml"
+    "Examples:  \ncanbase record replay stop_robot_20261124T201500.000Z_watchdog_tripped.asc  \n"
+    "canbase record replay stop.asc --config shorter_lease.yaml"
 )
 
 

@@ -1,4 +1,4 @@
-"""`canbase sample`: a robot.yaml that comes with canbase, to start one's own from."""
+"""`canbase print sample`: a robot.yaml that comes with canbase, to start one's own from."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def sample(
         ),
     ] = None,
 ) -> None:
-    """Print a sample robot.yaml, for example: canbase sample bench > robot.yaml
+    """Print a sample robot.yaml, for example: canbase print sample bench > robot.yaml
 
     Exit codes: 0 printed, 2 there is no such sample.
     """

@@ -1,4 +1,4 @@
-"""`canbase scan`: the nodes on the bus, their identities, and the drive profile that fits each."""
+"""`canbase bus scan`: the nodes on the bus, their identities, and the drive profile that fits each."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from canbase_cli.options import ConfigOption
 
 EPILOG: Final = (
     "Examples:  \n"
-    "canbase scan --channel can0  \n"
-    "canbase scan --config robot.yaml --passive  \n"
-    "canbase scan --interface slcan --channel /dev/ttyACM0 --bitrate 500000 --json"
+    "canbase bus scan --channel can0  \n"
+    "canbase bus scan --config robot.yaml --passive  \n"
+    "canbase bus scan --interface slcan --channel /dev/ttyACM0 --bitrate 500000 --json"
 )
 
 

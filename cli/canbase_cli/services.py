@@ -38,7 +38,6 @@ SERVICES: Final = ("driver", "velocity", "action-server", "watchdog", "sim")
 """Names of the commands here."""
 WITHOUT_ROS: Final = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
 """The ROS wheels' start-up hook would start every Python of their environment a second time."""
-_PANEL: Final = "Services: one process each, as `canbase up` starts them"
 
 
 StopFileOption = Annotated[
@@ -123,7 +122,7 @@ def sim(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings only.")] = False,
     factory_fresh: Annotated[
-        bool, typer.Option("--factory-fresh", help="Every drive has node id 1 and 125 kbit/s: for canbase adopt.")
+        bool, typer.Option("--factory-fresh", help="Every drive has node id 1 and 125 kbit/s: for canbase bus adopt.")
     ] = False,
 ) -> None:
     """Run simulated drives on the robot's bus, in place of the real ones."""
@@ -200,9 +199,9 @@ def leave_stop_file(robot: Robot, path: Path | None) -> None:
 
 def add_services(app: typer.Typer) -> None:
     """The commands of SERVICES."""
-    ros: dict[str, Any] = {"cls": RosCommand, "options_metavar": ROS_USAGE, "rich_help_panel": _PANEL}
+    ros: dict[str, Any] = {"cls": RosCommand, "options_metavar": ROS_USAGE}
     app.command("driver", **ros)(driver)
     app.command("velocity", **ros)(velocity)
     app.command("action-server", **ros)(action_server)
-    app.command("watchdog", cls=RosCommand, rich_help_panel=_PANEL)(watchdog)
-    app.command("sim", cls=RosCommand, rich_help_panel=_PANEL)(sim)
+    app.command("watchdog", cls=RosCommand)(watchdog)
+    app.command("sim", cls=RosCommand)(sim)

@@ -128,7 +128,7 @@ class Stack:
         return "" if self._logs is None else (self._logs / f"{part}.log").read_text(errors="replace")
 
     def _spawn(self, part: str) -> subprocess.Popen[bytes]:
-        argv = module_command("canbase_cli.child", str(os.getpid()), part, *self._options)
+        argv = module_command("canbase_cli.child", str(os.getpid()), "serve", part, *self._options)
         argv += self._own_options.get(part, [])
         if part not in WITHOUT_ROS:
             argv += self._ros_args

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from canbase_cli.end_signals import end_signals
-from canbase_cli.options import ConfigOption, NamespaceOption, ros_arguments
+from canbase_cli.options import BenchOption, ConfigOption, NamespaceOption, named, ros_arguments
 from canbase_cli.stack import POLL_S, Death, Stack
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.terminal import FAILED, colour, fail, load_config
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 def up(
     ctx: typer.Context,
     config: ConfigOption = None,
+    bench: BenchOption = False,
     namespace: NamespaceOption = "",
     sim: Annotated[
         bool | None,
@@ -38,12 +39,12 @@ def up(
 
     Exit codes: 0 every process ended well after Ctrl-C or SIGTERM, 1 a process died, 2 wrong command line or file.
     """
-    loaded = load_config(config)
+    loaded = load_config(named(config, bench=bench))
     for_parts, for_readiness = ros_arguments(ctx, ""), ros_arguments(ctx, namespace)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
     _refuse_twice(loaded.robot)
     ended = end_signals()
-    stack = Stack(loaded.path, namespace=namespace, sim=with_sim, ros_args=for_parts, quiet_sim=not verbose)
+    stack = Stack(loaded.path.resolve(), namespace=namespace, sim=with_sim, ros_args=for_parts, quiet_sim=not verbose)
     with stack, _reports_when_ready(namespace, for_readiness):
         _say(f"{loaded.robot.name} is starting; Ctrl-C stops the robot and ends it")
         death = _wait(stack, ended)

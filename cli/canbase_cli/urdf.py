@@ -1,4 +1,4 @@
-"""`canbase urdf`: the robot of a robot.yaml for robot_state_publisher, RViz and Foxglove."""
+"""`canbase print urdf`: the robot of a robot.yaml for robot_state_publisher, RViz and Foxglove."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def urdf(
         typer.Option("--controllers", help="Print controllers.yaml for diff_drive_controller of ros2_control instead."),
     ] = False,
 ) -> None:
-    """Print the URDF of a robot.yaml: base, wheels, scanners. For example: canbase urdf robot.yaml > robot.urdf
+    """Print the URDF of a robot.yaml: base, wheels, scanners. For example: canbase print urdf robot.yaml > robot.urdf
 
     The joints have the names of joint_states, and the base is base.base_frame. A scanner with pose: config is a link
     called like its topic. Heights are not in robot.yaml: they are chosen. With a source of type joint_command in

@@ -1,4 +1,4 @@
-"""`canbase vda5050`: the safety part of the VDA 5050 state of a running robot, as lines of JSON."""
+"""`canbase serve vda5050`: the safety part of the VDA 5050 state of a running robot, as lines of JSON."""
 
 from __future__ import annotations
 

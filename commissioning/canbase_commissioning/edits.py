@@ -65,7 +65,8 @@ def wheel_edits(robot: Robot, found: Sequence[WheelFound]) -> list[Edit]:
 
 
 def floor_edits(robot: Robot, found: FloorFound) -> list[Edit]:
-    """Radius and track. What `canbase calibrate` has found stays where the tape agrees: it is the more exact one."""
+    """Radius and track. What `canbase setup calibrate` has found stays where the tape agrees: it is the more exact
+    one."""
     base, odometry = robot.base, robot.odometry
     edits = []
     for key, before, measured, error, tape in (

@@ -1,4 +1,4 @@
-"""`canbase jog`: one wheel turns while a key is held on a terminal, and only then. Pure.
+"""`canbase bus jog`: one wheel turns while a key is held on a terminal, and only then. Pure.
 
 A terminal reports only key presses: a held key repeats, and a released key no longer does. So the first press
 moves nothing, motion begins with the first repetition, and ends when the next one does not come in time.

@@ -1,4 +1,4 @@
-"""`canbase nmt`: what each NMT command does to a motor, and whether the nodes did it. CiA 301, CiA 402-2. Pure."""
+"""`canbase bus nmt`: what each NMT command does to a motor, and whether the nodes did it. CiA 301, CiA 402-2. Pure."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A robot.yaml for drives that were found on a bus: the questions about the robot, and the file. Pure.
 
-`canbase init` asks them. The file is a sample with its comments, in which the answers stand.
+`canbase setup init` asks them. The file is a sample with its comments, in which the answers stand.
 """
 
 from __future__ import annotations
@@ -213,9 +213,11 @@ def _drive(wheel: Wheel, joint: str) -> str:
         f"    node_id: {wheel.found.node_id}",
         *([f"    axis: {wheel.found.axis}"] if wheel.found.axis else []),
         f"    side: {wheel.side.value}",
-        "    direction: 1                  # not measured yet: canbase commission finds it"
+        "    direction: 1                  # not measured yet: canbase setup commission finds it"
         if wheel.side is Side.LEFT
-        else "    direction: -1                 # mounted mirrored, as on most bases; canbase commission finds it",
+        else (
+            "    direction: -1                 # mounted mirrored, as on most bases; canbase setup commission finds it"
+        ),
         f"    gear_ratio: {wheel.gear_ratio:.9g}",
         f"    counts_per_motor_rev: {wheel.counts_per_motor_rev}",
         f"    profile: {wheel.found.profile}",

@@ -1,4 +1,4 @@
-"""`canbase sdo`: the steps of reading or writing one object, and when a write is refused. CiA 301, CiA 402-2."""
+"""`canbase bus sdo`: the steps of reading or writing one object, and when a write is refused. CiA 301, CiA 402-2."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ if sys.prefix != sys.base_prefix:
 _USES_RELAY: Final = "from gpiod import LineSettings, request_lines\n"
 _ADVICE: Final = (
     "With ROS 2 from apt the whole command has to know it: sudo bash -c 'source /opt/canbase/install/setup.bash && "
-    "canbase install …'"
+    "canbase setup install …'"
 )
 
 
@@ -163,7 +163,7 @@ def neighbours(prefix: Path, name: str, installed: Iterable[str]) -> list[Neighb
         except ConfigError as error:
             raise InstallError(
                 f"{error}\nthe robot {other} is installed too, and this version cannot use its {path}. Mend it "
-                f"(`canbase config check --config {path}`), or `sudo canbase uninstall {other}`. {UNCHANGED}"
+                f"(`canbase config check --config {path}`), or `sudo canbase setup uninstall {other}`. {UNCHANGED}"
             ) from error
         found.append(Neighbour(other, loaded.robot, named_texts(loaded.files), environment(prefix, other)))
     return found

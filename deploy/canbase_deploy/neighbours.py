@@ -43,7 +43,8 @@ def clash(own: Neighbour, other: Neighbour) -> str:
     """
     name, robot, theirs = own.name, own.robot, other.robot
     renamed = (
-        f"`sudo canbase uninstall {other.name}` first if it is this one under its old name, else give this one another"
+        f"`sudo canbase setup uninstall {other.name}` first if it is this one under its old name, "
+        f"else give this one another"
     )
     has = f"the robot {other.name} is installed and has"
     if (theirs.bus.interface, theirs.bus.channel) == (robot.bus.interface, robot.bus.channel):

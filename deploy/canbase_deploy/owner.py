@@ -7,8 +7,10 @@ from collections.abc import Iterable
 from pathlib import PurePosixPath
 from typing import Final
 
-USER: Final = "canbase"
-ETC: Final = PurePosixPath("/etc/canbase")
+from canbase_runtime import which_robot
+from canbase_runtime.which_robot import USER as USER
+
+ETC: Final = PurePosixPath(which_robot.ETC)
 OURS: Final = (ETC / "can", ETC / "installed")
 """Folders in which no file is the owner's."""
 RESERVED: Final = (*OURS, ETC / "keys")

@@ -3,7 +3,7 @@
     ros2 launch canbase robot.launch.py config:=robot.yaml
 
 `config` is a robot.yaml or a parameter file of ROS. When one part ends, or launch itself, all end: the base stops.
-Services that start at boot and come back are systemd's work: `canbase install`.
+Services that start at boot and come back are systemd's work: `canbase setup install`.
 """
 
 import os

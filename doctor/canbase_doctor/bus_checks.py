@@ -189,7 +189,7 @@ def _unread(seen: BusEvidence, name: str, node_id: int) -> Check:
     return fail(
         name,
         f"no frame received; {why}",
-        "power, cable, termination, bit rate, node id; canbase scan shows who answers",
+        "power, cable, termination, bit rate, node id; canbase bus scan shows who answers",
     )
 
 
@@ -270,7 +270,7 @@ def _self_stop(seen: BusEvidence, name: str, found: Inspection) -> Check:
         return fail(name, f"not now: {changes}", _advice(seen, found.node_id))
     when = "set" if set_now else "when the driver has set it"
     notes = f"; {_some(found.self_stop_part.notes)}" if found.self_stop_part.notes else ""
-    return ok(name, f"by {found.self_stop}, {when}{notes}. canbase commission proves it")
+    return ok(name, f"by {found.self_stop}, {when}{notes}. canbase setup commission proves it")
 
 
 def _some(texts: tuple[str, ...]) -> str:
@@ -284,4 +284,4 @@ def _strangers(seen: BusEvidence) -> list[Check]:
     if not others:
         return []
     told = f"node {', '.join(map(str, others))} on the bus and not in robot.yaml"
-    return [warn("other nodes", told, "canbase does not use them; canbase scan identifies them")]
+    return [warn("other nodes", told, "canbase does not use them; canbase bus scan identifies them")]

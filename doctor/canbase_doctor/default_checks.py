@@ -130,7 +130,9 @@ def _drive(drive: Any) -> Check:
         return fail(name, f"{found}; 0x{drive.error_code:04X} {drive.error_text}", "remove the cause, canbase reset")
     if math.isnan(drive.heartbeat_age_s) and math.isnan(drive.feedback_age_s):
         return fail(
-            name, "no frame received", "power, cable, termination, bit rate, node id; canbase scan shows who answers"
+            name,
+            "no frame received",
+            "power, cable, termination, bit rate, node id; canbase bus scan shows who answers",
         )
     if not drive.stops_by_itself:
         return warn(

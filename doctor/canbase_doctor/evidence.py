@@ -157,7 +157,7 @@ class Evidence:
     """Of doctor itself."""
     answers: Answers = Answers()
     metrics_unit: str = ""
-    """The unit that starts `canbase metrics` with the robot; empty: none is enabled on this computer."""
+    """The unit that starts `canbase serve metrics` with the robot; empty: none is enabled on this computer."""
     overload: Overload = field(default_factory=Overload)
     """Of this computer, while doctor listened."""
 

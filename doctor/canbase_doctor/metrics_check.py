@@ -1,4 +1,4 @@
-"""The row of `canbase doctor` about `canbase metrics`: a process that a robot may have, and does not need."""
+"""The row of `canbase doctor` about `canbase serve metrics`: a process that a robot may have, and does not need."""
 
 from __future__ import annotations
 

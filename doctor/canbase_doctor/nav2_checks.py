@@ -16,8 +16,8 @@ from canbase_doctor.evidence import Endpoint, Evidence, VelocityTopic
 from canbase_doctor.nav2_speeds import speed_checks
 
 NAME: Final = "Nav2 wiring"
-LAUNCH: Final = "start Nav2 with the launch file of canbase nav2 --launch"
-PARAMS: Final = "start Nav2 with the parameters of canbase nav2"
+LAUNCH: Final = "start Nav2 with the launch file of canbase print nav2 --launch"
+PARAMS: Final = "start Nav2 with the parameters of canbase print nav2"
 MUX, FILTER, DRIVER, INPUT = "velocity_mux", "safety_filter", "motor_driver", "cmd_vel"
 PLANNERS: Final = {"controller_server", "behavior_server"}
 """They may share a topic: one of them commands at a time."""
@@ -187,7 +187,9 @@ def _unread(wiring: Wiring, topic: str, senders: Sequence[str]) -> Check:
     """Of nodes that Nav2's launch file always starts, whether somebody wants them or not: a warning."""
     told, short = f"nobody reads {topic} of {wiring.listed(senders)}", [wiring.short(node) for node in senders]
     if direct := [DIRECT[node] for node in short if node in DIRECT]:
-        cure = f"to use it, add the source {', '.join(direct)} to mux.sources of robot.yaml: canbase nav2 prints it"
+        cure = (
+            f"to use it, add the source {', '.join(direct)} to mux.sources of robot.yaml: canbase print nav2 prints it"
+        )
         return warn(NAME, told, cure)
     if "collision_monitor" in short:
         return fail(NAME, told, _monitor_topic(wiring))

@@ -50,7 +50,7 @@ def speed_checks(seen: Evidence) -> list[Check]:
     above = list(_above(seen, {LINEAR: most.linear_mps, ANGULAR: most.angular_radps}))
     if not above:
         return [ok(NAME, f"at most {most.linear_mps:g} {LINEAR} and {most.angular_radps:g} {ANGULAR}, as robot.yaml")]
-    return [warn(NAME, "; ".join(above), "the base does not follow them: canbase nav2 prints fitting parameters")]
+    return [warn(NAME, "; ".join(above), "the base does not follow them: canbase print nav2 prints fitting parameters")]
 
 
 def _above(seen: Evidence, most: dict[str, float]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""`canbase support-bundle`: one file with all that remote help needs.
+"""`canbase record bundle`: one file with all that remote help needs.
 
 What is collected: `bundle_contents.py`. What is shown of it: `bundle_filter.py`; no text gets into the bundle without.
 """
@@ -30,6 +30,7 @@ from canbase_doctor.careful_read import RefusedError, modified, names, read_end
 from canbase_doctor.service_environment import service_environment
 from canbase_runtime.own_folder import replaced
 from canbase_runtime.terminal import FAILED, colour, fail
+from canbase_runtime.which_robot import ETC
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
@@ -40,7 +41,6 @@ TOTAL_BYTES: Final = 80_000_000
 """Of all: what comes later is missing."""
 MOST_FILES: Final = 200
 STATE: Final = Path("/var/lib/canbase")
-ETC: Final = Path("/etc/canbase")
 UNITS: Final = Path("/etc/systemd/system")
 PARTS: Final = ("driver", "watchdog", "velocity")
 """Whose records of stops there are."""

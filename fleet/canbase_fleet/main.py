@@ -1,4 +1,4 @@
-"""The process of `canbase metrics`: topics in, pages out, from its start to its end."""
+"""The process of `canbase serve metrics`: topics in, pages out, from its start to its end."""
 
 from __future__ import annotations
 

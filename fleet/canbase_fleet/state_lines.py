@@ -1,4 +1,4 @@
-"""The process of `canbase vda5050`: the state as JSON, a line when it changes and at least every PERIOD_S."""
+"""The process of `canbase serve vda5050`: the state as JSON, a line when it changes and at least every PERIOD_S."""
 
 from __future__ import annotations
 

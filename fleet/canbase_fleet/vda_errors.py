@@ -120,7 +120,7 @@ def _drives(message: Any, robot: Robot) -> Iterator[Error]:
             yield Error("drive_health", WARNING, drive.health, "", where)
         if enabled and not drive.stops_by_itself:
             text = "it would not stop by itself if this computer failed (1016h)"
-            yield Error("drive_not_guarded", WARNING, text, "canbase commission", where)
+            yield Error("drive_not_guarded", WARNING, text, "canbase setup commission", where)
 
 
 def _filter(message: Any) -> Iterator[Error]:

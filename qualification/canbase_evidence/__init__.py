@@ -1,1 +1,1 @@
-"""`canbase evidence`: what is known about the stops of one robot, in one folder, and what is missing of it."""
+"""`canbase prove evidence`: what is known about the stops of one robot, in one folder, and what is missing of it."""

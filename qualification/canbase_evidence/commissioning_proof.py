@@ -1,4 +1,5 @@
-"""What `canbase commission` has proven for a robot, step by step, and whether robot.yaml is still the same. Pure."""
+"""What `canbase setup commission` has proven for a robot, step by step, and whether robot.yaml is still the same.
+Pure."""
 
 from __future__ import annotations
 
@@ -44,7 +45,7 @@ _SENTENCES = {
 def _finding(standing: Standing, proofs: list[StepProof]) -> Finding:
     told = ", ".join(f"{proof.step} ({proof.shows})" for proof in proofs)
     steps = ",".join(proof.step for proof in proofs)
-    cure = "" if standing.counts else f"canbase commission --config robot.yaml --steps {steps}"
+    cure = "" if standing.counts else f"canbase setup commission --config robot.yaml --steps {steps}"
     return Finding(Part.COMMISSIONING, standing, f"{_SENTENCES[standing]} {told}.", cure)
 
 

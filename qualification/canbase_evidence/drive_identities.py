@@ -15,11 +15,11 @@ from canbase_evidence.standing import Finding, Part, Standing
 KEYS: Final = ("vendor_id", "product_code", "revision", "serial")
 """1018h:1 to 4."""
 Numbers = tuple[int | None, int | None, int | None, int | None]
-_CURE: Final = "canbase commission writes identity into robot.yaml"
+_CURE: Final = "canbase setup commission writes identity into robot.yaml"
 
 
 class ScanError(ValueError):
-    """The text is not what `canbase scan --json` prints."""
+    """The text is not what `canbase bus scan --json` prints."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class NodeIdentity:
 
 
 def node_identities(robot: Robot, scan: Sequence[Mapping[str, Any]] | None) -> tuple[NodeIdentity, ...]:
-    """`scan`: the rows of `canbase scan --json`; None: no scan was given. Raises ScanError."""
+    """`scan`: the rows of `canbase bus scan --json`; None: no scan was given. Raises ScanError."""
     read = {} if scan is None else _read(scan)
     return tuple(
         NodeIdentity(
@@ -71,7 +71,7 @@ def findings(nodes: Iterable[NodeIdentity], scanned: bool) -> tuple[Finding, ...
 
 
 def words(numbers: Numbers | None) -> str:
-    """vendor:product:revision:serial, hexadecimal as in `canbase scan`."""
+    """vendor:product:revision:serial, hexadecimal as in `canbase bus scan`."""
     return "–" if numbers is None else ":".join("–" if n is None else f"{n:X}" for n in numbers)
 
 
@@ -79,7 +79,9 @@ def _finding(node: NodeIdentity, scanned: bool) -> Finding:
     name = f"Node {node.node_id} ({node.joints})"
     if node.differs:
         told = f"{name} is {words(node.read)}, and robot.yaml expects {words(node.expected)}: another drive."
-        return Finding(Part.DRIVES, Standing.OTHER, told, "the drive that was proven, or canbase commission again")
+        return Finding(
+            Part.DRIVES, Standing.OTHER, told, "the drive that was proven, or canbase setup commission again"
+        )
     if scanned and node.read is None:
         return Finding(Part.DRIVES, Standing.INCOMPLETE, f"{name} did not answer the scan.", "power, cable, node id")
     missing = [key for key in KEYS if not _is_known(node, key)]
@@ -102,5 +104,5 @@ def _read(scan: Sequence[Mapping[str, Any]]) -> dict[int, Numbers]:
     try:
         rows = {int(row["node_id"]): tuple(row[key] for key in KEYS) for row in scan}
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ScanError("it is not what canbase scan --json prints") from error
+        raise ScanError("it is not what canbase bus scan --json prints") from error
     return {node_id: (a, b, c, d) for node_id, (a, b, c, d) in rows.items() if any(n is not None for n in (a, b, c, d))}

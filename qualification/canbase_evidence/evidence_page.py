@@ -173,7 +173,7 @@ def _files(evidence: Evidence) -> str:
         f'<tr><td><a href="{html.escape(name)}">{_text(name)}</a></td><td class="mono">{digest}</td></tr>'
         for name, digest in sorted(evidence.files.items())
     )
-    told = f"{NAME} has the hashes of all files, this page included: <code>canbase evidence --check FOLDER</code>"
+    told = f"{NAME} has the hashes of all files, this page included: <code>canbase prove evidence --check FOLDER</code>"
     return f"<p>{told}, or <code>sha256sum -c {NAME}</code>.</p>{_scroll(('file', 'SHA-256'), rows)}"
 
 

@@ -48,13 +48,13 @@ class Sources:
     recordings: Sequence[Path] = ()
     """Folders with black boxes, or single .asc files."""
     commissioning: Sequence[Path] = ()
-    """Reports of `canbase commission`."""
+    """Reports of `canbase setup commission`."""
     scan: Path | None = None
-    """What `canbase scan --json` printed."""
+    """What `canbase bus scan --json` printed."""
 
 
 def reports_beside(loaded: Loaded) -> list[Path]:
-    """The reports of `canbase commission`, where it writes them by default: beside robot.yaml."""
+    """The reports of `canbase setup commission`, where it writes them by default: beside robot.yaml."""
     return sorted(loaded.path.parent.glob(f"commissioning-{loaded.robot.name}-*.md"))
 
 
@@ -155,7 +155,7 @@ def _scan(folder: Folder, path: Path | None) -> Sequence[Mapping[str, Any]] | No
             return told
     except (ValueError, RecursionError) as error:
         raise GatherError(f"--scan {path}: no JSON: {error}") from error
-    raise GatherError(f"--scan {path}: it is not what canbase scan --json prints")
+    raise GatherError(f"--scan {path}: it is not what canbase bus scan --json prints")
 
 
 def _qualification(folder: Folder, path: Path | None, this: ThisRobot) -> Finding:
@@ -180,7 +180,7 @@ def _report(path: Path) -> Mapping[str, Any] | None:
 def _reports(files: Sequence[str]) -> list[Finding]:
     """Texts for people; the marks in robot.yaml are what counts."""
     if files:
-        told = f"{len(files)} reports of canbase commission, not judged here: {', '.join(files)}."
+        told = f"{len(files)} reports of canbase setup commission, not judged here: {', '.join(files)}."
         return [Finding(Part.COMMISSIONING, Standing.PRESENT, told)]
     told, cure = "No report of a commissioning was given.", "--commissioning FILE: commissioning-….md"
     return [Finding(Part.COMMISSIONING, Standing.MISSING, told, cure)]
@@ -196,7 +196,7 @@ def _recordings(folder: Folder, paths: Sequence[Path]) -> list[recorded.Recorded
 
 
 def _copy_inputs(folder: Folder, path: Path) -> None:
-    """What watchdog, mux and filter recorded of their own inputs: `canbase replay` finds it beside the stops."""
+    """What watchdog, mux and filter recorded of their own inputs: `canbase record replay` finds it beside the stops."""
     for name in names(path) if path.is_dir() else ():
         if name.endswith(INPUTS_SUFFIX):
             folder.copy("recordings", path / name)

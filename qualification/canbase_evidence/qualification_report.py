@@ -1,4 +1,4 @@
-"""What `report.json` of `canbase qualify` says, and whether it is about this robot and this canbase. Pure.
+"""What `report.json` of `canbase prove qualify` says, and whether it is about this robot and this canbase. Pure.
 
 The files of a qualification are taken as they are: only verdict, number of violations, configuration and version of
 report.json are read.
@@ -19,7 +19,7 @@ ALL_FILES: Final = (*FILES, "qualification.json", "robot.yaml")
 PASSED, FAILED = "passed", "failed"
 _GRADES: Final[Mapping[str, Standing]] = {PASSED: Standing.PRESENT, FAILED: Standing.FAILED}
 """`grade` of report.json; any other one has proven nothing."""
-_CURE: Final = "canbase qualify robot.yaml --out FOLDER; then --qualification FOLDER"
+_CURE: Final = "canbase prove qualify robot.yaml --out FOLDER; then --qualification FOLDER"
 
 
 @dataclass(frozen=True, slots=True)

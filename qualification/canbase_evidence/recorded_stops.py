@@ -1,6 +1,6 @@
 """The recorded stops of a robot: whether each is of this configuration, of these drives and of this version. Pure.
 
-`canbase explain` and `canbase replay` read the files themselves.
+`canbase explain` and `canbase record replay` read the files themselves.
 """
 
 from __future__ import annotations

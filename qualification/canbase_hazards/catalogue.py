@@ -87,7 +87,7 @@ class Row(BaseModel):
     """The stop category of IEC 60204-1 that the reaction resembles. Described, never claimed."""
     tests: Annotated[tuple[str, ...], Field(min_length=1)]
     faults: tuple[str, ...] = ()
-    """Failures of the campaign that are this one: names of faults, or of twins as `what: how`. `canbase qualify`
+    """Failures of the campaign that are this one: names of faults, or of twins as `what: how`. `canbase prove qualify`
     measures them, and the twins of the rows `matrix: …` of `tests`."""
     safeguard: str = ""
     """Name in campaign/removed_safeguards.py: `make teeth` takes it out and must find it missing."""

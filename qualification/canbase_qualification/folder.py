@@ -67,7 +67,7 @@ def read_about(folder: Path) -> About:
     try:
         return About.of_text((folder / NAME).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise FolderError(f"{folder} has no {NAME}: it is no folder of canbase qualify") from error
+        raise FolderError(f"{folder} has no {NAME}: it is no folder of canbase prove qualify") from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FolderError(f"{folder / NAME} cannot be read: {error}") from error
 

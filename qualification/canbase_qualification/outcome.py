@@ -62,7 +62,7 @@ class Ages:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One run. `kind` and `seed` say which: `canbase qualify FILE --scenario SEED` tells a scenario as a log."""
+    """One run. `kind` and `seed` say which: `canbase prove qualify FILE --scenario SEED` tells a scenario as a log."""
 
     kind: str
     seed: int

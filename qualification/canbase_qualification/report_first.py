@@ -26,7 +26,8 @@ NOT_LOOKED_AT: Final = (
     "the corners of a base that turns while it stops: distances are those of its middle, from begin to end, straight",
     "wheels that slip or lift, tilting, loads that shift, trailers",
     "a safety relay or STO that takes the power off all drives at once: the wheels then coast, and no software brakes",
-    "the real computer: Linux, DDS and Python are modelled as delays and pauses; `canbase benchmark` measures them",
+    "the real computer: Linux, DDS and Python are modelled as delays and pauses; `canbase prove "
+    "benchmark` measures them",
     "what a scanner or a camera does not see, and its own response time, resolution and measuring error",
     "more than one failure of the CAN wiring at a time that also takes a drive's configuration",
 )

@@ -120,9 +120,10 @@ def own_stop_sentence(report: Report) -> str:
             f"{', '.join(no)} do NOT stop by themselves when the computer or the cable fails: only STO stops them."
         )
     if unproven:
-        parts.append(f"For {', '.join(unproven)} it is not proven; `canbase commission` tests it on the robot.")
+        parts.append(f"For {', '.join(unproven)} it is not proven; `canbase setup commission` tests it on the robot.")
     if not parts:
         return (
-            "By their profiles all drives stop by themselves when both heartbeats end. `canbase commission` proves it."
+            "By their profiles all drives stop by themselves when both heartbeats end. `canbase setup "
+            "commission` proves it."
         )
     return " ".join(parts)

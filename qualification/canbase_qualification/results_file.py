@@ -53,7 +53,7 @@ class ResultsFile:
             self._cut()
         except BlockingIOError as error:
             self._file.close()
-            raise ResultsError(f"{self.path}: another canbase qualify writes there") from error
+            raise ResultsError(f"{self.path}: another canbase prove qualify writes there") from error
         except ResultsError:
             self._file.close()
             raise

@@ -207,6 +207,6 @@ def _drives_not_judged(robot: Robot) -> Iterator[str]:
     if profile not in PERSONALITIES:
         yield (
             f"drives: {profile} is a profile of your own: plain CiA 402 drives were simulated in its place. Whether "
-            "the real ones stop by themselves is not known here; canbase commission tests it."
+            "the real ones stop by themselves is not known here; canbase setup commission tests it."
         )
     yield "Hardware: wiring, STO, brakes, tyres, the accuracy of the drive's model. This is simulation, no certificate."

@@ -18,7 +18,7 @@ LONGEST: Final = 5
 SHOWN: Final = 10
 """So many violations are printed one by one."""
 OPTIONS: Final = {SCENARIO: "--scenario", STOP: "--stop"}
-"""How `canbase qualify` tells one run."""
+"""How `canbase prove qualify` tells one run."""
 SENTENCES: Final = {**PROPERTIES, **OWN_PROPERTIES}
 
 
@@ -89,4 +89,4 @@ def command(outcome: Outcome, file: str, load: Load) -> str:
         return f"{outcome.kind}, seed {outcome.seed}: {outcome.robot}"
     low, high = load.payloads
     given = "" if load == Load() else f" --payload {low:g}..{high:g} --slope {load.slope:g}"
-    return f"canbase qualify {file} {OPTIONS[outcome.kind]} {outcome.seed}{given}"
+    return f"canbase prove qualify {file} {OPTIONS[outcome.kind]} {outcome.seed}{given}"

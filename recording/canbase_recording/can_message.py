@@ -53,7 +53,7 @@ def unpack_frame(message: bytes) -> tuple[int, bytes, bool, bool, bool, bool]:
         )
     _, _, _, length, _, can_id, remote, extended, error, dlc, data = _FRAME.unpack(message)
     if length > 2 or dlc > 8:
-        raise ValueError(f"a frame with {dlc} bytes and a frame id of {length}: not of canbase export")
+        raise ValueError(f"a frame with {dlc} bytes and a frame id of {length}: not of canbase record export")
     return can_id, data[:dlc], length == 2, remote, extended, error
 
 

@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Kind(Enum):
-    """What service a frame belongs to; the values are those of `canbase dump --kind`."""
+    """What service a frame belongs to; the values are those of `canbase bus dump --kind`."""
 
     __hash__ = object.__hash__
 

@@ -1,4 +1,4 @@
-"""The frames of a bus, live, as entries of a recording: for `canbase dump`. It sends nothing."""
+"""The frames of a bus, live, as entries of a recording: for `canbase bus dump`. It sends nothing."""
 
 from __future__ import annotations
 

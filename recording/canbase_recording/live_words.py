@@ -1,4 +1,4 @@
-"""The lines of `canbase dump`: each frame in words, some of them left out. Pure."""
+"""The lines of `canbase bus dump`: each frame in words, some of them left out. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`canbase export`: a recording as an MCAP file of ROS messages, which Foxglove and PlotJuggler open."""
+"""`canbase record export`: a recording as an MCAP file of ROS messages, which Foxglove and PlotJuggler open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames and notes out of an MCAP file of `canbase export`, by Foxglove's library."""
+"""Frames and notes out of an MCAP file of `canbase record export`, by Foxglove's library."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ class RecordingFile:
             return "ASC", lambda: self._by_lines(can.ASCReader, is_asc=True)
         what = "it is empty" if not head else f"it begins with {first[:40]!r}"
         raise NoRecordingError(
-            f"{self.path}: no recording that is known here (ASC, candump -L, BLF, TRC, MCAP of canbase export, "
+            f"{self.path}: no recording that is known here (ASC, candump -L, BLF, TRC, MCAP of canbase record export, "
             f"watchdog_….jsonl): {what}"
         )
 

@@ -1,4 +1,4 @@
-"""Both files of a recorded stop: the inputs for `canbase replay`, and the robot. A shell: files alone."""
+"""Both files of a recorded stop: the inputs for `canbase record replay`, and the robot. A shell: files alone."""
 
 from __future__ import annotations
 

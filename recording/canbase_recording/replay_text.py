@@ -1,4 +1,5 @@
-"""What `canbase replay` reports, in words and as plain values for JSON. Pure. Times: seconds of the recording."""
+"""What `canbase record replay` reports, in words and as plain values for JSON. Pure. Times: seconds of the
+recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What `canbase replay` reports of mux and filter that were fed with their own file, in words and for JSON. Pure."""
+"""What `canbase record replay` reports of mux and filter that were fed with their own file, in words and for JSON.
+Pure."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from canbase_config.drive import Drive
 from canbase_config.robot import Robot
 from canbase_runtime.foreign_text import printable
 
-CURE = "give the wheels a ros2_control tag of their own, as canbase urdf prints it"
+CURE = "give the wheels a ros2_control tag of their own, as canbase print urdf prints it"
 
 
 class JointMessage(Protocol):

@@ -161,6 +161,8 @@ class LatchFile:
 
     def _replace(self, record: Record) -> None:
         os.close(open_own_folder(self.path.parent, 0o700))
+        if self.path.exists() and not self.path.is_file():
+            self.path.unlink()  # such as a pipe, which is no record
         with replaced(self.path, private=True) as file:
             file.write(latch_record.whole(record, self._owner))
         self._descriptor, self._sequence = os.open(self.path, os.O_RDWR | _OPEN), 2

@@ -56,17 +56,22 @@ def _address(task: str, name: str) -> str:
 
 def holder(task: str, name: str) -> int | None:
     """Process id of the present holder; None: there is none. Raises OSError where the kernel does not report it."""
+    return holder_at(_address(task, name))
+
+
+def holder_at(address: str) -> int | None:
+    """The same by the address of its socket, which begins with a zero byte."""
     try:
-        return _holder(task, name)[0]
+        return _holder(address)[0]
     except ConnectionRefusedError:
         return None
 
 
-def _holder(task: str, name: str) -> tuple[int, int]:
+def _holder(address: str) -> tuple[int, int]:
     """Process and user id of the holder."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
         caller.setblocking(False)
-        caller.connect(_address(task, name))
+        caller.connect(address)
         pid, uid, _ = _CREDENTIALS.unpack(caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
     return pid, uid
 
@@ -74,7 +79,7 @@ def _holder(task: str, name: str) -> tuple[int, int]:
 def _who(task: str, name: str) -> str:
     """Process, user and command of the holder, as far as this user may see them."""
     try:
-        pid, uid = _holder(task, name)
+        pid, uid = _holder(_address(task, name))
     except OSError as error:
         return f"who it is cannot be seen ({error.strerror or error})"
     try:

@@ -64,17 +64,26 @@ def with_cursor(stream: TextIO) -> TextIO:
 
 
 def load_config(path: Path | None, *, quiet: bool = False) -> Loaded:
-    """The robot in `path`, or the bench sample. Prints warnings unless `quiet`; problems always, and exits with 2."""
-    from canbase_config.errors import ConfigError
-    from canbase_config.load import load_robot, sample
+    """The robot in `path`, or the one that is meant (which_robot.py), which it names.
 
-    path = sample("bench") if path is None else path
+    Prints warnings unless `quiet`; problems always, and exits with 2.
+    """
+    from canbase_config.errors import ConfigError
+    from canbase_config.load import load_robot
+    from canbase_runtime.which_robot import NoRobotError, which_robot
+
     try:
-        loaded = load_robot(path)
+        meant = which_robot(path)
+    except NoRobotError as error:
+        fail(str(error), WRONG_INPUT)
+    try:
+        loaded = load_robot(meant.path)
     except ConfigError as error:
         typer.echo(str(error), err=True)
         count = len(error.problems)
-        fail(f"{path} cannot be used: {count} problem{'s' if count > 1 else ''}", WRONG_INPUT)
+        fail(f"{meant.path} cannot be used: {count} problem{'s' if count > 1 else ''}", WRONG_INPUT)
+    if meant.why:
+        typer.echo(f"robot {loaded.robot.name}: {meant.path} ({meant.why})", err=True)
     for warning in () if quiet else loaded.warnings:
         warn(str(warning))
     return loaded

@@ -1,7 +1,7 @@
 """The state of mux and filter as plain values for JSON: what a recording begins with. No clock, no file.
 
-`canbase replay` puts it into new cores (canbase_recording.core_state). What belongs to the configuration is left out:
-the new cores have it already, or another one.
+`canbase record replay` puts it into new cores (canbase_recording.core_state). What belongs to the configuration is
+left out: the new cores have it already, or another one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What mux and filter decided from in the last seconds, call by call, and what they decided. No clock, no file.
 
-The same calls give new cores the same decisions (`canbase replay`). A recording begins with their state, which is kept
-every CHECKPOINT_S. The form of the file: docs/ros_api.md, "The inputs of mux and filter".
+The same calls give new cores the same decisions (`canbase record replay`). A recording begins with their state, which
+is kept every CHECKPOINT_S. The form of the file: docs/ros_api.md, "The inputs of mux and filter".
 """
 
 from __future__ import annotations

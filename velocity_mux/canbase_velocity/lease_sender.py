@@ -31,7 +31,7 @@ class LeaseSender:
     def _report(self) -> str:
         if not self._problem:
             return f"leases reach the watchdog at {self.path} again"
-        return f"no lease to the watchdog at {self.path}: {self._problem}; is `canbase watchdog` running?"
+        return f"no lease to the watchdog at {self.path}: {self._problem}; is `canbase serve watchdog` running?"
 
     def close(self) -> None:
         """Closes the socket; nothing can be sent afterwards."""

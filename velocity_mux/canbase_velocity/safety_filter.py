@@ -290,7 +290,7 @@ def _lowered(inputs: Inputs) -> Finding:
 
 
 def _commission(config: FilterConfig) -> tuple[str, str]:
-    return f"{config.uncommissioned}, see safety.uncommissioned_mps", "canbase commission"
+    return f"{config.uncommissioned}, see safety.uncommissioned_mps", "canbase setup commission"
 
 
 def _corners(command: Twist, mps: float, config: FilterConfig, cause: StopCause, why: str, clears_on: str) -> Finding:

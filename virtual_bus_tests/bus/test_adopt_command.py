@@ -1,4 +1,4 @@
-"""`canbase adopt` as a command: drives fresh from the box, both node 1 at 125 kbit/s, on a bus with bit rates."""
+"""`canbase bus adopt` as a command: drives fresh from the box, both node 1 at 125 kbit/s, on a bus with bit rates."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ PATIENCE_S = 150.0
 
 
 def nodes(config: Path) -> list[tuple[int, int | None]]:
-    """Node id and serial number of each node that `canbase scan` finds."""
-    done = canbase("scan", "--config", str(config), "--seconds", "0.2", "--json")
+    """Node id and serial number of each node that `canbase bus scan` finds."""
+    done = canbase("bus", "scan", "--config", str(config), "--seconds", "0.2", "--json")
     assert done.returncode == 0, done.stderr
     return [(row["node_id"], row["serial"]) for row in json.loads(done.stdout)]
 
@@ -46,8 +46,8 @@ def nodes(config: Path) -> list[tuple[int, int | None]]:
 def test_two_drives_fresh_from_the_box_are_ready_and_stay_so_over_a_power_cycle(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
     with drives(config, FRESH) as control:
-        assert canbase("scan", "--config", str(config), "--seconds", "0.2").returncode == 1
-        done = canbase("adopt", "--config", str(config), "--yes", timeout_s=PATIENCE_S)
+        assert canbase("bus", "scan", "--config", str(config), "--seconds", "0.2").returncode == 1
+        done = canbase("bus", "adopt", "--config", str(config), "--yes", timeout_s=PATIENCE_S)
         assert done.returncode == 0, done.stdout + done.stderr
         assert "drives answer at 125000 bit/s" in done.stdout
         assert "node 1: two drives or more have this node id" in done.stdout
@@ -66,8 +66,8 @@ def power_cycle(control: SimControl) -> None:
 
 
 def states(config: Path) -> set[str]:
-    """The CiA 402 states of both drives, as `canbase sdo` has them."""
-    texts = [canbase("sdo", "read", str(node), "6041", "--config", str(config)).stdout for node in (1, 2)]
+    """The CiA 402 states of both drives, as `canbase bus sdo` has them."""
+    texts = [canbase("bus", "sdo", "read", str(node), "6041", "--config", str(config)).stdout for node in (1, 2)]
     return {text.rpartition(": ")[2].strip().upper().replace(" ", "_") for text in texts}
 
 
@@ -94,7 +94,7 @@ def test_answers_choose_the_node_ids(tmp_path: Path) -> None:
     answers.write_text("start: yes\nserial_1: 2\nserial_2: 1\n", encoding="utf-8")
     with drives(config, FRESH):
         words = ("--config", str(config), "--answers", str(answers), "--present-bitrate", "125000")
-        done = canbase("adopt", *words, timeout_s=PATIENCE_S)
+        done = canbase("bus", "adopt", *words, timeout_s=PATIENCE_S)
         assert done.returncode == 0, done.stdout + done.stderr
         assert nodes(config) == [(1, 2), (2, 1)]
 
@@ -102,7 +102,7 @@ def test_answers_choose_the_node_ids(tmp_path: Path) -> None:
 def test_ctrl_c_leaves_the_drives_waiting_and_a_power_cycle_brings_back_what_was(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
     factory = bus_at(load_robot(config).robot.bus, 125_000).arguments()
-    words = argv("adopt", "--config", str(config), "--yes", "--present-bitrate", "125000")
+    words = argv("bus", "adopt", "--config", str(config), "--yes", "--present-bitrate", "125000")
     with drives(config, FRESH) as control:
         process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
         assert process.stderr is not None
@@ -119,7 +119,7 @@ def test_ctrl_c_leaves_the_drives_waiting_and_a_power_cycle_brings_back_what_was
         assert requests[-1] == bytes((4, 0, 0, 0, 0, 0, 0, 0))
         power_cycle(control)
         at_the_rate_of_the_drives = write_robot(tmp_path, factory["port"], "factory.yaml")
-        again = canbase("scan", "--config", str(at_the_rate_of_the_drives), "--seconds", "0.2")
+        again = canbase("bus", "scan", "--config", str(at_the_rate_of_the_drives), "--seconds", "0.2")
         assert "node 1: two drives or more answer" in again.stderr
 
 
@@ -141,7 +141,7 @@ def test_another_master_ends_it_before_any_lss(tmp_path: Path) -> None:
         notifier = can.Notifier(other, [spy])
         thread = threading.Thread(target=_sync, args=(other, stopped))
         thread.start()
-        done = canbase("adopt", "--config", str(config), "--yes", timeout_s=PATIENCE_S)
+        done = canbase("bus", "adopt", "--config", str(config), "--yes", timeout_s=PATIENCE_S)
         stopped.set()
         thread.join()
         notifier.stop()
@@ -159,9 +159,11 @@ def test_a_motor_with_power_ends_it(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
     with drives(config):
         for index, value in (("6060", "3"), ("6040", "6"), ("6040", "7"), ("6040", "15")):
-            done = canbase("sdo", "write", "1", index, value, "--config", str(config), "--force")
+            done = canbase("bus", "sdo", "write", "1", index, value, "--config", str(config), "--force")
             assert done.returncode == 0, done.stderr
-        done = canbase("adopt", "--config", str(config), "--yes", "--present-bitrate", "500000", timeout_s=PATIENCE_S)
+        done = canbase(
+            "bus", "adopt", "--config", str(config), "--yes", "--present-bitrate", "500000", timeout_s=PATIENCE_S
+        )
     assert done.returncode == 1
     assert "node 1 is in operation enabled: its motor may have power" in done.stderr
     assert "Nothing was changed" in done.stderr
@@ -169,12 +171,12 @@ def test_a_motor_with_power_ends_it(tmp_path: Path) -> None:
 
 def test_an_empty_cable_is_1(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
-    done = canbase("adopt", "--config", str(config), "--yes", timeout_s=PATIENCE_S)
+    done = canbase("bus", "adopt", "--config", str(config), "--yes", timeout_s=PATIENCE_S)
     assert done.returncode == 1
     assert "no drive answers at any bit rate; check power, cable, termination" in done.stderr
 
 
 def test_a_bit_rate_that_canopen_does_not_have_is_2() -> None:
-    done = canbase("adopt", "--channel", "can0", "--bitrate", "123456")
+    done = canbase("bus", "adopt", "--channel", "can0", "--bitrate", "123456")
     assert done.returncode == 2
     assert "expected one of 1000000" in done.stderr

@@ -1,4 +1,5 @@
-"""`canbase commission` as a command before simulated drives: robot.yaml, report, exit code, a signal on the way."""
+"""`canbase setup commission` as a command before simulated drives: robot.yaml, report, exit code, a signal on the
+way."""
 
 from __future__ import annotations
 
@@ -41,7 +42,7 @@ def test_a_wrong_count_is_measured_again_and_changes_nothing(tmp_path: Path) -> 
     )
     options = ("--answers", answers, "--yes", "--steps", "scale,proof", "--revolutions", "0.3")
     with drives(config) as control:
-        done = canbase("commission", "-c", str(config), *options, timeout_s=120.0)
+        done = canbase("setup", "commission", "-c", str(config), *options, timeout_s=120.0)
         assert abs(control.truth().v_left_mps) < 0.001
     assert done.returncode == 1, done.stdout + done.stderr
     assert "robot.yaml is wrong: drives[0].gear_ratio" in done.stdout
@@ -62,7 +63,7 @@ def test_what_the_numbers_of_each_drive_mean_is_noted_for_later_boots(tmp_path: 
     )
     options = ("--answers", answers, "--yes", "--steps", "directions,scale", "--revolutions", "0.3")
     with drives(config):
-        done = canbase("commission", "-c", str(config), *options, timeout_s=120.0)
+        done = canbase("setup", "commission", "-c", str(config), *options, timeout_s=120.0)
     assert done.returncode == 0, done.stdout + done.stderr
     robot = load_robot(config).robot
     for drive in robot.drives:
@@ -76,7 +77,7 @@ def test_a_report_is_never_overwritten(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
     old = tmp_path / "proven.md"
     old.write_text("PROVEN", encoding="utf-8")
-    done = canbase("commission", "-c", str(config), "--report", str(old), "--dry-run", "--yes")
+    done = canbase("setup", "commission", "-c", str(config), "--report", str(old), "--dry-run", "--yes")
     assert done.returncode == 2
     assert "a report is never overwritten" in done.stderr
     assert old.read_text(encoding="utf-8") == "PROVEN"
@@ -95,6 +96,7 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
             direction__right_wheel__again="forward",
         )
         done = canbase(
+            "setup",
             "commission",
             "-c",
             str(config),
@@ -126,7 +128,7 @@ def test_a_wrong_direction_is_corrected_and_the_self_stop_proven(tmp_path: Path)
 def test_a_drive_that_does_not_stop_by_itself_is_not_proven_and_1(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port(), profile="tmcm1636", velocity_unit=None)
     with drives(config) as control:
-        done = canbase("commission", "-c", str(config), "--yes", "--steps", "proof,floor", timeout_s=120.0)
+        done = canbase("setup", "commission", "-c", str(config), "--yes", "--steps", "proof,floor", timeout_s=120.0)
         time.sleep(0.5)
         assert abs(control.truth().v_left_mps) < 0.001
     assert done.returncode == 1, done.stdout + done.stderr
@@ -138,7 +140,7 @@ def test_a_drive_that_does_not_stop_by_itself_is_not_proven_and_1(tmp_path: Path
 
 def test_sigterm_while_the_wheels_turn_stops_them_and_the_report_says_so(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
-    words = argv("commission", "-c", str(config), "--yes", "--steps", "floor", "--distance", "5")
+    words = argv("setup", "commission", "-c", str(config), "--yes", "--steps", "floor", "--distance", "5")
     with drives(config) as control:
         process = subprocess.Popen(words, env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         end = time.monotonic() + 40.0
@@ -156,7 +158,7 @@ def test_beside_another_master_nothing_is_sent(tmp_path: Path) -> None:
     config = write_robot(tmp_path, port)
     with can.Bus("239.74.163.2", "udp_multicast", port=port, hop_limit=0) as other:
         process = subprocess.Popen(
-            argv("commission", "-c", str(config), "--yes"), env=ENVIRONMENT, stderr=subprocess.PIPE, text=True,
+            argv("setup", "commission", "-c", str(config), "--yes"), env=ENVIRONMENT, stderr=subprocess.PIPE, text=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
         )  # fmt: skip
         while process.poll() is None:
@@ -172,8 +174,8 @@ def test_beside_another_master_nothing_is_sent(tmp_path: Path) -> None:
 
 def test_without_an_answer_or_a_robot_it_ends_with_advice(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
-    assert canbase("commission", "-c", str(tmp_path / "none.yaml")).returncode == 2
-    assert canbase("commission", "-c", str(config), "--steps", "dance").returncode == 2
-    done = canbase("commission", "-c", str(config))
+    assert canbase("setup", "commission", "-c", str(tmp_path / "none.yaml")).returncode == 2
+    assert canbase("setup", "commission", "-c", str(config), "--steps", "dance").returncode == 2
+    done = canbase("setup", "commission", "-c", str(config))
     assert done.returncode == 1
     assert "no answer to wheels_up: run it on a terminal, or give it in --answers" in done.stderr

@@ -1,4 +1,4 @@
-"""`canbase commission --json` before another program: questions and answers in lines of JSON."""
+"""`canbase setup commission --json` before another program: questions and answers in lines of JSON."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, SimC
 
 @pytest.fixture
 def page(bench: tuple[Path, SimControl]) -> Iterator[Page]:
-    page = Page("commission", "--config", str(bench[0]), "--steps", "directions", "--json", "--dry-run")
+    page = Page("setup", "commission", "--config", str(bench[0]), "--steps", "directions", "--json", "--dry-run")
     yield page
     page.process.kill()
     page.process.wait(10.0)

@@ -1,4 +1,5 @@
-"""`canbase commission` before a person at a terminal: questions and answers, and every way to stop wheels that turn."""
+"""`canbase setup commission` before a person at a terminal: questions and answers, and every way to stop wheels that
+turn."""
 
 from __future__ import annotations
 

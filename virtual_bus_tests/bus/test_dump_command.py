@@ -1,4 +1,4 @@
-"""`canbase dump` as a process on a bus: frames in words, filters, Ctrl-C, a closed pipe; and it sends nothing."""
+"""`canbase bus dump` as a process on a bus: frames in words, filters, Ctrl-C, a closed pipe; and it sends nothing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TURN_S = 0.02
 
 @contextmanager
 def dumping(config: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
-    command = argv("dump", "--config", str(config), *words)
+    command = argv("bus", "dump", "--config", str(config), *words)
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT, bufsize=1
     )
@@ -88,7 +88,7 @@ def test_only_what_is_asked_for(bench: tuple[Path, can.BusABC]) -> None:
 
 
 def test_a_reader_that_has_enough_is_no_error(bench: tuple[Path, can.BusABC]) -> None:
-    """As with `canbase dump | head -1`."""
+    """As with `canbase bus dump | head -1`."""
     config, bus = bench
     with dumping(config) as process:
         assert process.stdout is not None
@@ -121,7 +121,7 @@ def test_it_sends_nothing(bench: tuple[Path, can.BusABC]) -> None:
 
 
 def test_a_bus_that_cannot_be_opened_is_1_with_its_reason() -> None:
-    command = argv("dump", "--interface", "socketcan", "--channel", "nocan7")
+    command = argv("bus", "dump", "--interface", "socketcan", "--channel", "nocan7")
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=50.0, check=False)
     assert done.returncode == 1
     assert "socketcan nocan7 cannot be opened" in done.stderr

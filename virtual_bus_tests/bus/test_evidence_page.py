@@ -1,4 +1,5 @@
-"""The page of `canbase evidence` in a real browser, offline, with the list of what is installed; and its picture."""
+"""The page of `canbase prove evidence` in a real browser, offline, with the list of what is installed; and its
+picture."""
 
 from __future__ import annotations
 

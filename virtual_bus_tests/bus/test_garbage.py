@@ -98,7 +98,7 @@ def test_the_simulator_lives_and_answers_a_tool_meanwhile(tmp_path: Path) -> Non
     config = write_robot(tmp_path, port)
     with drives(config) as control:
         garbage.send(port, MANY)
-        told = canbase("sdo", "read", "1", "0x1000", "--config", str(config))
+        told = canbase("bus", "sdo", "read", "1", "0x1000", "--config", str(config))
         garbage.send(port, MANY)
         time.sleep(0.1)
         assert control.truth().linear_mps == 0.0
@@ -109,7 +109,7 @@ def test_the_simulator_lives_and_answers_a_tool_meanwhile(tmp_path: Path) -> Non
 def test_the_watchdog_lives_and_says_how_many(tmp_path: Path) -> None:
     port = free_udp_port()
     config = write_robot(tmp_path, port)
-    command = argv("watchdog", "--config", str(config))
+    command = argv("serve", "watchdog", "--config", str(config))
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
     limit = time.monotonic() + 20.0
     while not (tmp_path / "lease.sock").exists() and time.monotonic() < limit:

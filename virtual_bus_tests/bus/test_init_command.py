@@ -1,4 +1,4 @@
-"""`canbase init` as a command: from simulated drives that no robot.yaml describes to a file that drives them."""
+"""`canbase setup init` as a command: from simulated drives that no robot.yaml describes to a file that drives them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def test_two_drives_become_a_robot_yaml_that_passes_the_check(bench: Path, tmp_path: Path) -> None:
     output, answers = tmp_path / "new.yaml", tmp_path / "answers.yaml"
     answers.write_text(GEAR + "name: fred\nscanner: no\nestop: no\n", encoding="utf-8")
-    done = canbase("init", "--config", str(bench), "--output", str(output), "--answers", str(answers), "--yes")
+    done = canbase("setup", "init", "--config", str(bench), "--output", str(output), "--answers", str(answers), "--yes")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "found node 1 (generic CiA 402 drive), profile generic" in done.stdout
     robot = load_robot(output).robot
@@ -40,13 +40,13 @@ def test_two_drives_become_a_robot_yaml_that_passes_the_check(bench: Path, tmp_p
         (1, "left", 4096),
         (2, "right", 4096),
     ]
-    assert f"canbase commission --config {output}" in done.stdout
+    assert f"canbase setup commission --config {output}" in done.stdout
     assert canbase("config", "check", "--config", str(output)).returncode == 0
 
 
 def test_a_question_without_an_answer_writes_nothing(bench: Path, tmp_path: Path) -> None:
     output = tmp_path / "new.yaml"
-    done = canbase("init", "--config", str(bench), "--output", str(output), "--yes")
+    done = canbase("setup", "init", "--config", str(bench), "--output", str(output), "--yes")
     assert done.returncode == 1
     assert "no answer to node1.gear_ratio: run it on a terminal, or give it in --answers" in done.stderr
     assert list(tmp_path.glob("new.yaml*")) == []
@@ -87,7 +87,7 @@ def answer_until_the_end(page: Page, first: Callable[[], object] = lambda: None)
 
 def test_another_program_asks_in_place_of_the_terminal(bench: Path, tmp_path: Path) -> None:
     output = tmp_path / "new.yaml"
-    page = Page("init", "--config", str(bench), "--output", str(output), "--json")
+    page = Page("setup", "init", "--config", str(bench), "--output", str(output), "--json")
     answer_until_the_end(page)
     assert page.ends() == ""
     assert page.process.returncode == 0
@@ -98,7 +98,7 @@ def test_another_program_asks_in_place_of_the_terminal(bench: Path, tmp_path: Pa
 def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
     output = tmp_path / "robot.yaml"
     output.write_text("name: mine\n", encoding="utf-8")
-    done = canbase("init", "--channel", "can0", "--output", str(output), "--yes")
+    done = canbase("setup", "init", "--channel", "can0", "--output", str(output), "--yes")
     assert done.returncode == 2
     assert "is never overwritten" in done.stderr
     assert output.read_text(encoding="utf-8") == "name: mine\n"
@@ -107,13 +107,13 @@ def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
 def test_a_draft_that_a_person_has_corrected_is_kept_too(tmp_path: Path) -> None:
     output, draft = tmp_path / "robot.yaml", tmp_path / "robot.yaml.draft.yaml"
     draft.write_text("name: mine\n", encoding="utf-8")
-    done = canbase("init", "--channel", "can0", "--output", str(output), "--yes")
+    done = canbase("setup", "init", "--channel", "can0", "--output", str(output), "--yes")
     assert (done.returncode, draft.read_text(encoding="utf-8")) == (2, "name: mine\n")
 
 
 def test_a_file_that_came_while_the_person_answered_is_kept(bench: Path, tmp_path: Path) -> None:
     output = tmp_path / "new.yaml"
-    page = Page("init", "--config", str(bench), "--output", str(output), "--json")
+    page = Page("setup", "init", "--config", str(bench), "--output", str(output), "--json")
     answer_until_the_end(page, lambda: output.write_text("name: mine\n", encoding="utf-8"))
     assert "File exists" in page.ends()
     assert page.process.returncode == 1
@@ -123,6 +123,6 @@ def test_a_file_that_came_while_the_person_answered_is_kept(bench: Path, tmp_pat
 def test_an_empty_bus_is_1(tmp_path: Path) -> None:
     config = write_robot(tmp_path, free_udp_port())
     words = ("--config", str(config), "--output", str(tmp_path / "new.yaml"))
-    done = canbase("init", *words, "--yes", "--sdo-timeout", "0.05")
+    done = canbase("setup", "init", *words, "--yes", "--sdo-timeout", "0.05")
     assert done.returncode == 1
     assert "power, cable, termination, bit rate" in done.stderr

@@ -1,4 +1,4 @@
-"""`canbase jog` as a process on a terminal, and every way to end it while the wheel turns."""
+"""`canbase bus jog` as a process on a terminal, and every way to end it while the wheel turns."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def test_a_terminal_that_goes_stops_the_wheel(bench: tuple[Path, SimControl]) ->
 def test_beside_a_driver_it_is_refused_and_without_a_terminal_too(tmp_path: Path) -> None:
     port = free_udp_port()
     config = write_robot(tmp_path, port)
-    assert canbase("jog", "left_wheel", "--config", str(config)).returncode == 2
-    assert canbase("jog", "wheel", "--config", str(config)).returncode == 2
+    assert canbase("bus", "jog", "left_wheel", "--config", str(config)).returncode == 2
+    assert canbase("bus", "jog", "wheel", "--config", str(config)).returncode == 2
     with can.Bus("239.74.163.2", "udp_multicast", port=port, hop_limit=0) as other:
         terminal = Terminal(*jog(config))
         try:

@@ -1,4 +1,5 @@
-"""`canbase qualify` with its real processes: killed, broken off, resumed, and on a dask cluster of this computer."""
+"""`canbase prove qualify` with its real processes: killed, broken off, resumed, and on a dask cluster of this
+computer."""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ BATCHES_S = 240.0
 
 def command(folder: Path, *arguments: str, file: Path | None = None) -> list[str]:
     robot = str(file or sample("bench"))
-    return [sys.executable, "-m", "canbase_cli", "qualify", robot, "--out", str(folder), *arguments]
+    return [sys.executable, "-m", "canbase_cli", "prove", "qualify", robot, "--out", str(folder), *arguments]
 
 
 def run(folder: Path, *arguments: str, file: Path | None = None) -> subprocess.CompletedProcess[str]:

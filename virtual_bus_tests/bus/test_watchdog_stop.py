@@ -105,12 +105,12 @@ def children(pid: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-# a watchdog holds the bus ── a second `canbase watchdog` ends ── no stop frames
+# a watchdog holds the bus ── a second `canbase serve watchdog` ends ── no stop frames
 def test_a_second_watchdog_stops_no_robot_by_its_end(tmp_path: Path) -> None:
     robot = write_robot(tmp_path, free_udp_port())
     arguments = load_robot(robot).robot.bus.arguments()
     with can.Bus(**arguments) as listener, take("watchdog", bus_name(arguments)):
-        command = [sys.executable, "-m", "canbase_cli", "watchdog", "--config", str(robot)]
+        command = [sys.executable, "-m", "canbase_cli", "serve", "watchdog", "--config", str(robot)]
         ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
         assert ended.returncode == 1
         assert "watchdog" in ended.stderr

@@ -1,4 +1,5 @@
-"""`python -m campaign.replays`: black boxes of drawn scenarios, replayed as `canbase replay` does it. What agrees?
+"""`python -m campaign.replays`: black boxes of drawn scenarios, replayed as `canbase record replay` does it. What
+agrees?
 
 Each scenario drives in virtual time with faults; what its driver would have recorded is written to files, read, and fed
 to a new watchdog. Exit code 1: less than AGREE of the trips that a recording can explain come out the same, or a
@@ -106,7 +107,7 @@ NEAR_S: Final = 0.02
 
 
 def _life_of(at_s: float, own: Sequence[Replayed], heard: Sequence[Replayed]) -> Replayed | None:
-    """By the watchdog's own file, as `canbase replay` does it; else by the driver's recording."""
+    """By the watchdog's own file, as `canbase record replay` does it; else by the driver's recording."""
     ends = [life for life in (*own, *heard) if life.life.trip is not None and abs(life.life.trip.at_s - at_s) < NEAR_S]
     return ends[0] if ends else None
 

@@ -161,7 +161,7 @@ LIES: tuple[Twin, ...] = (
 )
 """Something differs from its description."""
 TWINS = (*STOPS, *(replace(twin, lies=True) for twin in LIES))
-"""Those that `canbase qualify` tries too, one by one."""
+"""Those that `canbase prove qualify` tries too, one by one."""
 
 DELIVERY: tuple[Twin, ...] = (
     Twin("adapter", "of motor_driver fails", fault("bus_problem")),

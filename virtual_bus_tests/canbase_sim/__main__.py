@@ -1,4 +1,4 @@
-"""`python -m canbase_sim ROBOT.yaml`: the same as `canbase sim`, without the rest of canbase installed."""
+"""`python -m canbase_sim ROBOT.yaml`: the same as `canbase serve sim`, without the rest of canbase installed."""
 
 from __future__ import annotations
 

@@ -38,7 +38,9 @@ class SimControl:
             self._socket.connect(str(path))
         except OSError as error:
             self._socket.close()
-            raise ControlError(f"no simulator at {path} ({error.strerror}); start it with `canbase sim`") from error
+            raise ControlError(
+                f"no simulator at {path} ({error.strerror}); start it with `canbase serve sim`"
+            ) from error
         self._lines = self._socket.makefile("rb")
 
     def __enter__(self) -> SimControl:

@@ -1,4 +1,4 @@
-"""`canbase sim`: the simulated drives of a robot.yaml in real time, until SIGINT or SIGTERM."""
+"""`canbase serve sim`: the simulated drives of a robot.yaml in real time, until SIGINT or SIGTERM."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Hook of pytest: in JUnit XML each test states which code it has tested, and how many tests its file has.
 
-`canbase evidence` reads that: a passed test proves a row of hazards.yaml for the code that was tested alone, and a file
-of tests only when all of them have run.
+`canbase prove evidence` reads that: a passed test proves a row of hazards.yaml for the code that was tested alone,
+and a file of tests only when all of them have run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""`canbase calibrate` on a whole robot whose robot.yaml is 2 % off: real processes, a simulated scanner in a room."""
+"""`canbase setup calibrate` on a whole robot whose robot.yaml is 2 % off: real processes, a simulated scanner in a
+room."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ ANGLES_RAD: Array = np.linspace(-math.pi, math.pi, BEAMS, endpoint=False)
 def robot() -> Iterator[RunningRobot]:
     """Its drives turn wheels of another size than its robot.yaml has."""
     with own_domain() as domain, robot_on(domain, changes=merged(PATIENT, WRONG), start=False) as made:
-        made.command("sim", "--config", str(other_file(made)))
+        made.command("serve", "sim", "--config", str(other_file(made)))
         made.node.wait_for(control_path(made.robot).exists, READY_S, "the simulated drives")
         made.stack = Stack(made.config, sim=False, logs=made.folder, env=os.environ | made.env)
         made.stack.start()
@@ -83,7 +84,7 @@ def scanner(robot: RunningRobot) -> None:
 
 
 def test_ctrl_c_stops_the_base(robot: RunningRobot) -> None:
-    calibrate = robot.command("calibrate", str(robot.config), *SQUARES)
+    calibrate = robot.command("setup", "calibrate", str(robot.config), *SQUARES)
     robot.wait_speed(0.2, timeout_s=READY_S)
     calibrate.interrupt()
     assert robot.exit_code(calibrate, READY_S) == CANCELED, calibrate.log()
@@ -94,7 +95,7 @@ def test_ctrl_c_stops_the_base(robot: RunningRobot) -> None:
 
 
 def test_a_robot_yaml_that_is_2_percent_off_is_right_afterwards(robot: RunningRobot) -> None:
-    calibrate = robot.command("calibrate", str(robot.config), *SQUARES, "--write")
+    calibrate = robot.command("setup", "calibrate", str(robot.config), *SQUARES, "--write")
     assert robot.exit_code(calibrate, CALIBRATE_S) == 0, calibrate.log()
     print(calibrate.log())
     base = load_robot(robot.config).robot.base

@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
 TRIALS = 20
 STOP_S = 0.25
-"""A loaded machine answers within this; `canbase benchmark stop` measures it."""
+"""A loaded machine answers within this; `canbase prove benchmark stop` measures it."""
 PAUSE_S = 3.0
 CUT_NODE = 1
 

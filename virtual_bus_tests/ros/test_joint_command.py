@@ -127,7 +127,7 @@ def test_hardware_with_its_default_threshold_shows_no_zero_and_moves_nothing(
     robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
 ) -> None:
     wait_followed(robot, mux)
-    hardware.threshold = 1e-5  # canbase urdf writes -1
+    hardware.threshold = 1e-5  # canbase print urdf writes -1
     robot.node.wait_for(lambda: control(mux).standing == MuxSource.SILENT, 10.0, f"its silence at rest: {mux.last}")
     sent = hardware.sent
     robot.node.spin_for(0.5)

@@ -1,4 +1,5 @@
-"""`canbase metrics` beside a running robot: its numbers are true, it writes nothing, and its clients stop nothing."""
+"""`canbase serve metrics` beside a running robot: its numbers are true, it writes nothing, and its clients stop
+nothing."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ class Fleet:
         self.robot = robot
         self.world = World(robot)
         self.port = free_tcp_port()
-        self.process = robot.command("metrics", "--config", str(robot.config), "--port", str(self.port))
+        self.process = robot.command("serve", "metrics", "--config", str(robot.config), "--port", str(self.port))
 
     def drive(self) -> None:
         """By the joystick, which is followed after a zero, until it goes 0.2 m/s."""
@@ -171,7 +172,7 @@ def test_the_state_for_vda_5050_follows_the_stop_button(fleet: Fleet) -> None:
 def test_a_driver_that_dies_leaves_no_number_behind(fleet: Fleet) -> None:
     """Last: this ends the robot."""
     fleet.wait("canbase_driver_state enabled", 1.0)
-    lines = fleet.robot.command("vda5050", "--config", str(fleet.robot.config))
+    lines = fleet.robot.command("serve", "vda5050", "--config", str(fleet.robot.config))
     fleet.robot.node.wait_for(lambda: '"eStop":"NONE"' in lines.log(), PATIENCE_S, "a line of canbase vda5050")
     fleet.robot.send("driver", signal.SIGKILL)
     fleet.wait("canbase_data_age_seconds motor_driver/status", 1.5)

@@ -1,5 +1,5 @@
-"""Stand-ins wired as Nav2's launch file wires Nav2: with what `canbase nav2` prints they drive the base, and each of
-five mistakes is named by `canbase doctor`, with its cure.
+"""Stand-ins wired as Nav2's launch file wires Nav2: with what `canbase print nav2` prints they drive the base, and
+each of five mistakes is named by `canbase doctor`, with its cure.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Site:
 
     @property
     def printed(self) -> dict[str, Any]:
-        """What `canbase nav2` prints for this robot, as stand-ins take it."""
-        self.params_file.write_text(self.out("nav2"), encoding="utf-8")
+        """What `canbase print nav2` prints for this robot, as stand-ins take it."""
+        self.params_file.write_text(self.out("print", "nav2"), encoding="utf-8")
         return {"params_file": str(self.params_file), "remappings": chain(load_robot(self.config).robot).remappings}
 
     @property
@@ -124,9 +124,9 @@ def test_what_canbase_nav2_prints_drives_the_base_within_its_limits(site: Site, 
 
 
 def test_five_mistakes_are_named_with_their_cure(site: Site) -> None:
-    """Each is one change to what canbase nav2 prints, or Nav2 as it comes."""
+    """Each is one change to what canbase print nav2 prints, or Nav2 as it comes."""
     printed = site.printed
-    with site.nav2({}):  # 1. Nav2's own launch file and parameters, canbase nav2 never called
+    with site.nav2({}):  # 1. Nav2's own launch file and parameters, canbase print nav2 never called
         rows = site.doctor()
     row = one(rows, "the input of motor_driver")
     assert {"docking_server", "following_server", "collision_monitor"} <= set(row["found"].replace(";", "").split())
@@ -137,7 +137,7 @@ def test_five_mistakes_are_named_with_their_cure(site: Site) -> None:
         rows = site.doctor()
     row = one(rows, "a loop")
     assert "collision_monitor → cmd_vel_nav → velocity_smoother" in row["found"]
-    assert "canbase nav2 --launch" in row["advice"]
+    assert "canbase print nav2 --launch" in row["advice"]
     assert one(rows, "before velocity_smoother has")["verdict"] == "fail"
     assert one(rows, "has 3 publishers")["verdict"] == "fail"
 
@@ -158,4 +158,4 @@ def test_five_mistakes_are_named_with_their_cure(site: Site) -> None:
     with site.nav2(printed):
         rows = site.doctor()
     row = one(rows, "velocity_smoother max_velocity is 1 m/s, robot.yaml permits 0.6")
-    assert (row["verdict"], "canbase nav2" in row["advice"]) == ("warn", True)
+    assert (row["verdict"], "canbase print nav2" in row["advice"]) == ("warn", True)

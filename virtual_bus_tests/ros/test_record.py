@@ -1,4 +1,4 @@
-"""`canbase record --mcap` beside publishers, and its file as Foxglove's library reads it."""
+"""`canbase record start --mcap` beside publishers, and its file as Foxglove's library reads it."""
 
 from __future__ import annotations
 

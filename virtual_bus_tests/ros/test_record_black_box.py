@@ -1,4 +1,5 @@
-"""`canbase record` beside a robot of real processes: written while it drives, and read by all that read a stop's."""
+"""`canbase record start` beside a robot of real processes: written while it drives, and read by all that read a
+stop's."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ def record(robot: RunningRobot, *options: str) -> tuple[int, str, str]:
     """Exit code, stdout, stderr; the test's node goes on meanwhile, so that its goal does too."""
     words = [*CANBASE, "record", *options]
     with subprocess.Popen(words, env=os.environ | robot.env, stdout=PIPE, stderr=PIPE, text=True) as process:
-        robot.node.wait_for(lambda: process.poll() is not None, 60.0, "canbase record")
+        robot.node.wait_for(lambda: process.poll() is not None, 60.0, "canbase record start")
         told, problem = process.communicate()
         return process.returncode, told.strip(), problem.strip()
 
@@ -66,8 +67,8 @@ def test_it_is_written_while_the_robot_drives_and_explain_export_and_replay_read
     code, text = run("explain", str(out))
     assert code == 0, text
     assert "No stop was found" in text
-    assert run("export", str(out), "--mcap", str(tmp_path / "driving.mcap"))[0] == 0
-    code, text = run("replay", str(out))
+    assert run("record", "export", str(out), "--mcap", str(tmp_path / "driving.mcap"))[0] == 0
+    code, text = run("record", "replay", str(out))
     assert code == 0, text
 
 
@@ -106,5 +107,5 @@ def test_a_folder_that_cannot_be_written_is_told_to_the_caller_and_the_robot_goe
     ],
 )
 def test_what_the_command_line_cannot_mean(options: tuple[str, ...], said: str) -> None:
-    code, text = run("record", *options)
+    code, text = run("record", "start", *options)
     assert (code, said in text) == (2, True)

@@ -1,4 +1,5 @@
-"""Stops of a whole robot of real processes: `canbase replay` finds the files of all parts, and all decide the same."""
+"""Stops of a whole robot of real processes: `canbase record replay` finds the files of all parts, and all decide the
+same."""
 
 from __future__ import annotations
 
@@ -48,8 +49,8 @@ def written(robot: RunningRobot, pattern: str, since_s: float) -> Path:
 
 
 def replayed(file: Path) -> dict[str, object]:
-    done = CliRunner().invoke(app, ["replay", str(file), "--json"])
-    assert done.exit_code == 0, CliRunner().invoke(app, ["replay", str(file)]).output
+    done = CliRunner().invoke(app, ["record", "replay", str(file), "--json"])
+    assert done.exit_code == 0, CliRunner().invoke(app, ["record", "replay", str(file)]).output
     values = json.loads(done.output)
     assert isinstance(values, dict)
     return values

@@ -137,7 +137,7 @@ def robot() -> Iterator[RunningRobot]:
 
 @pytest.fixture
 def started(robot: RunningRobot) -> Iterator[Started]:
-    robot.command("sim", "--config", str(robot.config))
+    robot.command("serve", "sim", "--config", str(robot.config))
     robot.node.wait_for(control_path(robot.robot).is_socket, 20.0, "the simulator")
     create_first(latch_folder(os.environ | robot.env, Path.home(), robot.robot.name), robot.robot.name)
     started = Started(robot)

@@ -28,7 +28,7 @@ class Driving:
 
     def __init__(self, robot: RunningRobot) -> None:
         self.robot = robot
-        robot.command("sim", "--config", str(robot.config))
+        robot.command("serve", "sim", "--config", str(robot.config))
         robot.node.wait_for(control_path(robot.robot).is_socket, 20.0, "the simulator")
         self.up: Process = robot.command("up", "--config", str(robot.config), "--no-sim")
         robot.wait_whole()
@@ -122,7 +122,7 @@ def part_of(pid: int) -> str | None:
     words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
     if "canbase_watchdog" in words:
         return "watchdog"
-    return words[words.index("canbase_cli.child") + 2] if "canbase_cli.child" in words else None
+    return words[words.index("canbase_cli.child") + 3] if "canbase_cli.child" in words else None
 
 
 def lives(pid: int) -> bool:

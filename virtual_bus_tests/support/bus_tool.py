@@ -42,7 +42,7 @@ def write_robot(folder: Path, port: int, name: str = "robot.yaml", **drives: Any
 
 @contextmanager
 def drives(config: Path, *options: str) -> Iterator[SimControl]:
-    """`canbase sim` as a process, and its control socket."""
+    """`canbase serve sim` as a process, and its control socket."""
     argv = [sys.executable, "-m", "canbase_sim", str(config), *options]
     process = subprocess.Popen(argv, stderr=subprocess.DEVNULL, env=ENVIRONMENT)
     try:

@@ -2,7 +2,7 @@
 
 It publishes the joints of its tag with the velocity commands that a controller has set, stamped now, at the rate of the
 controller manager, and takes the measured speeds from joint_states. As in the original it publishes nothing while the
-sum of the differences between commands and measured speeds is at most `threshold`: canbase urdf writes -1.
+sum of the differences between commands and measured speeds is at most `threshold`: canbase print urdf writes -1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The results of the scenarios as JUnit XML, for `canbase evidence --tests`."""
+"""The results of the scenarios as JUnit XML, for `canbase prove evidence --tests`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the guest has besides its system: the robot as `canbase install` makes it, and the test's own units."""
+"""What the guest has besides its system: the robot as `canbase setup install` makes it, and the test's own units."""
 
 from __future__ import annotations
 
@@ -40,7 +40,18 @@ def overlay(folder: Path) -> None:
     config.write_text(robot_yaml("can0", "/run/canbase/robot/lease.sock"), encoding="utf-8")
     tree = folder / "overlay"
     options = ["--python", "/opt/canbase/bin/python", "--hardware-watchdog", str(HARDWARE_WATCHDOG_S)]
-    command = [sys.executable, "-m", "canbase_cli", "install", "--config", str(config), "--prefix", str(tree), *options]
+    command = [
+        sys.executable,
+        "-m",
+        "canbase_cli",
+        "setup",
+        "install",
+        "--config",
+        str(config),
+        "--prefix",
+        str(tree),
+        *options,
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=_without_ros(os.environ))
     _drives(tree / "etc")
     _system(tree / "etc")
@@ -53,7 +64,7 @@ def overlay(folder: Path) -> None:
 
 
 def _without_ros(environment: Mapping[str, str]) -> dict[str, str]:
-    """The guest's ROS is its own: `canbase install` would take over the domain of whoever runs this, where the
+    """The guest's ROS is its own: `canbase setup install` would take over the domain of whoever runs this, where the
     scenarios would not find the robot."""
     return {name: value for name, value in environment.items() if not name.startswith(("ROS_", "RMW_"))}
 

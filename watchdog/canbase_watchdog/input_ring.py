@@ -1,6 +1,6 @@
 """What the watchdog decided from in the last seconds, call by call: frames, leases, ticks, and its verdicts. Pure.
 
-The same calls give a new watchdog the same verdicts at the same ticks (`canbase replay`). The form of the file:
+The same calls give a new watchdog the same verdicts at the same ticks (`canbase record replay`). The form of the file:
 docs/ros_api.md, "The inputs of a trip".
 """
 

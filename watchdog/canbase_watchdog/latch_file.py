@@ -136,6 +136,8 @@ class Keeper(threading.Thread):
 
     def _replace(self, entry: Entry) -> None:
         os.close(open_own_folder(self._path.parent, 0o700))
+        if self._path.exists() and not self._path.is_file():
+            self._path.unlink()  # such as a pipe, which is no record
         with replaced(self._path, private=True) as file:
             file.write(latch.page(entry, 1, self._whose) + latch.page(entry, 2, self._whose))
         self._descriptor, self._sequence = os.open(self._path, os.O_RDWR | _FLAGS), 2

@@ -334,12 +334,12 @@ def _setpoint_missing(view: View, config: WatchdogConfig, now_s: float) -> Verdi
 
 
 _TWO_DRIVES = (
-    "two drives answer as node {0}, that of {1}: give each its own id (canbase scan names them). If there is one "
+    "two drives answer as node {0}, that of {1}: give each its own id (canbase bus scan names them). If there is one "
     "alone, a gateway, a bridge or a second interface sends its frames again: take it out"
 )
 _COPIED_ANSWERS = (
     "node {0}, that of {1}, answers twice, with the same data within 2 ms: take out the gateway, the bridge "
-    "or the second interface that sends its frames again. If there is none, two drives have this id (canbase scan "
+    "or the second interface that sends its frames again. If there is none, two drives have this id (canbase bus scan "
     "names them): give each its own"
 )
 
@@ -387,7 +387,7 @@ _OF_A_SIGN = {
     None: "another master is on the bus: {}",
     False: (
         "another master is on the bus, or frames are sent again: {}. Our frames have no copies within 2 ms: find the "
-        "other master (canbase scan) and stop it. If there is none, take out the gateway, the bridge or the second "
+        "other master (canbase bus scan) and stop it. If there is none, take out the gateway, the bridge or the second "
         "interface that sends frames again"
     ),
     True: (

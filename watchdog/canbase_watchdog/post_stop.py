@@ -1,7 +1,8 @@
 """`python -m canbase_watchdog.post_stop FILE`: stop frames from a separate process, after driver or watchdog has ended.
 
-Needs the bus and nothing else that runs: no driver, no watchdog, no ROS, no robot.yaml. FILE is what `canbase driver`
-and `canbase watchdog` leave at their start (--stop-file). systemd calls it by ExecStopPost, after SIGKILL too.
+Needs the bus and nothing else that runs: no driver, no watchdog, no ROS, no robot.yaml. FILE is what `canbase serve
+driver`
+and `canbase serve watchdog` leave at their start (--stop-file). systemd calls it by ExecStopPost, after SIGKILL too.
 
 Without a --stop-file, driver and watchdog start it themselves with FILE `-`: it reads their pipe, which ends when they
 end, however they end. So the stop frames do not depend on who started them.

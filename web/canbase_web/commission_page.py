@@ -1,4 +1,5 @@
-"""The page `Commission`: the questions of `canbase commission` and `canbase init`, with the wheels drawn."""
+"""The page `Commission`: the questions of `canbase setup commission` and `canbase setup init`, with the wheels
+drawn."""
 
 from __future__ import annotations
 
@@ -134,14 +135,14 @@ class _View:
     async def _start(self) -> None:
         steps = ",".join(step for step, box in self._steps.items() if box.value)
         if steps and self._unlocked.value:
-            await self._run("commission", "--config", str(self._pages.loaded.path), "--steps", steps)
+            await self._run("setup", "commission", "--config", str(self._pages.loaded.path), "--steps", steps)
 
     async def _write(self) -> None:
         if not self._unlocked.value:
             return
         here = self._pages.loaded.path
         file = here.parent / Path(str(self._output.value)).name
-        await self._run("init", "--config", str(here), "--output", str(file))
+        await self._run("setup", "init", "--config", str(here), "--output", str(file))
 
     def _on_proof(self, event: GenericEventArguments) -> None:
         if self._leads:

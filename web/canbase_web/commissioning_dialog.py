@@ -1,4 +1,4 @@
-"""`canbase commission --json` and `canbase init --json` as a process, and the proof that somebody looks.
+"""`canbase setup commission --json` and `canbase setup init --json` as a process, and the proof that somebody looks.
 
 The process stops its wheels when it hears nothing for a second. It is told that the person is there only while a
 browser shows the page: each number that is sent there has to come back soon.

@@ -1,4 +1,4 @@
-"""`canbase adopt` on the bus: bit rate, node ids, both stored. What is sent and decided: `lss/`, `census.py`."""
+"""`canbase bus adopt` on the bus: bit rate, node ids, both stored. What is sent and decided: `lss/`, `census.py`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SWITCH_S: Final = 0.5
 """The drives change their bit rate so long after the order, and are silent as long again [s]."""
 UNTOUCHED: Final = "Nothing was changed"
 UNSTORED: Final = "Nothing was stored: a power cycle brings back the node ids and the bit rate of before"
-STORED: Final = "Some settings may be stored: canbase scan shows what is there"
+STORED: Final = "Some settings may be stored: canbase bus scan shows what is there"
 SAFE: Final = (
     "All drives on this bus lose their node ids and restart, then get new ones. No motor may have power: wheels up, "
     "emergency stop pressed. Go on?"
@@ -233,7 +233,8 @@ def _report(person: Operator, node_ids: dict[Identity, int], bus: Bus) -> None:
         person.tell(Tell(f"ready: node {node_id}, {bus.bitrate} bit/s, {one}; stored"))
     person.tell(
         Tell(
-            "Write each node id on its drive. Switch the drives off and on once: canbase scan has to show the same.\n"
-            "Next: canbase init writes a robot.yaml for them"
+            "Write each node id on its drive. Switch the drives off and on once: canbase bus scan has to "
+            "show the same.\n"
+            "Next: canbase setup init writes a robot.yaml for them"
         )
     )

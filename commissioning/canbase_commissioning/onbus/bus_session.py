@@ -20,7 +20,8 @@ MOST_FRAMES = 100
 
 
 def choose_bus(config: Path | None, interface: str | None, channel: str | None, bitrate: int | None) -> Bus:
-    """The bus of the command line, or that of robot.yaml where it names none. Exits with 2 when it makes no sense."""
+    """The bus of the command line, or that of the robot that is meant where it names none. Exits with 2 when it makes
+    no sense."""
     if interface is None and channel is None:
         return load_config(config).robot.bus
     kind = interface or "socketcan"

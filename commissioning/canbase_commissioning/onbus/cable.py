@@ -34,7 +34,7 @@ class Cable:
         """The bit rate that it has now is the right one: it is not set back at the end."""
         self._rate = self.link.bitrate if self.link else 0
         if sets_link and self.link and os.geteuid() != 0:
-            fail("--set-link calls ip link, which needs root: sudo canbase adopt …", FAILED)
+            fail("--set-link calls ip link, which needs root: sudo canbase bus adopt …", FAILED)
 
     @property
     def has_rate(self) -> bool:

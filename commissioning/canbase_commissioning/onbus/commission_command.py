@@ -1,4 +1,5 @@
-"""`canbase commission` on the bus: step by step, the report, robot.yaml. What is measured is in `commissioning`."""
+"""`canbase setup commission` on the bus: step by step, the report, robot.yaml. What is measured is in
+`commissioning`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`canbase emcy` on the bus. What is read and said is decided in `error_history.py`."""
+"""`canbase bus emcy` on the bus. What is read and said is decided in `error_history.py`."""
 
 from __future__ import annotations
 

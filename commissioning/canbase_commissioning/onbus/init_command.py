@@ -1,4 +1,4 @@
-"""`canbase init`: finds the drives on a bus, asks about the robot, writes its robot.yaml. It moves nothing."""
+"""`canbase setup init`: finds the drives on a bus, asks about the robot, writes its robot.yaml. It moves nothing."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def run(bus: Bus, output: Path, answers: Path | None, timeout_s: float, *, yes: 
     if len(axes) < 2:
         fail(
             "a base needs two motors; check power, cable, termination, bit rate, and that node ids differ. "
-            "For drives fresh from the box: canbase adopt",
+            "For drives fresh from the box: canbase bus adopt",
             FAILED,
         )
     try:
@@ -136,7 +136,7 @@ def _write(output: Path, text: str, person: Person) -> None:
     told = (
         f"wrote {output}. It passes canbase config check. Next, with the wheels up:\n"
         f"  canbase doctor --config {output}        what the drives report\n"
-        f"  canbase commission --config {output}    direction, scale, and whether the drives stop by themselves"
+        f"  canbase setup commission --config {output}    direction, scale, and whether the drives stop by themselves"
     )
     person.tell(Tell(told))
 

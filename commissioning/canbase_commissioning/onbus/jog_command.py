@@ -1,4 +1,4 @@
-"""`canbase jog` on the bus and on the terminal. What a held key means is in `commissioning/jog_session.py`."""
+"""`canbase bus jog` on the bus and on the terminal. What a held key means is in `commissioning/jog_session.py`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ STOPS: Final = "killed (SIGKILL), it leaves the wheel to the drive, which stops 
 
 
 def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None:
-    """Until q; the exit codes are in `canbase jog --help`."""
+    """Until q; the exit codes are in `canbase bus jog --help`."""
     robot = load_config(config).robot
     joints = [drive.joint for drive in robot.drives]
     if joint not in joints:

@@ -1,4 +1,5 @@
-"""`canbase params save` and `diff` on the bus. What is read and compared is decided in `commissioning/parameters`."""
+"""`canbase bus params save` and `diff` on the bus. What is read and compared is decided in
+`commissioning/parameters`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`canbase params restore`, `store` and `defaults`: what changes a drive, alone on the bus and after a question."""
+"""`canbase bus params restore`, `store` and `defaults`: what changes a drive, alone on the bus and after a question."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
 STORE_TIMEOUT_S: Final = 10.0
 """A drive may write a flash memory before it answers."""
-KEPT: Final = "The drive has them until its power goes or it is reset: canbase params store"
+KEPT: Final = "The drive has them until its power goes or it is reset: canbase bus params store"
 
 
 def read_dcf(path: Path, node: int | None) -> tuple[Parameters, Eds]:
@@ -41,7 +41,10 @@ def read_dcf(path: Path, node: int | None) -> tuple[Parameters, Eds]:
     except EdsError as error:
         fail(str(error), WRONG_INPUT)
     if not holds_values(eds):
-        fail(f"{path} has no ParameterValue: it is an EDS, not a DCF that canbase params save has written", WRONG_INPUT)
+        fail(
+            f"{path} has no ParameterValue: it is an EDS, not a DCF that canbase bus params save has written",
+            WRONG_INPUT,
+        )
     target = node or saved.node_id
     if target is None:
         fail(f"{path} does not name a node id ([DeviceComissioning]): add --node", WRONG_INPUT)
@@ -139,7 +142,7 @@ def run_order(
                       "it has stored. Go on?", "stored"),
         Order.DEFAULTS: (f"Node {node} gets its maker's parameters ({group}) with its next reset: units, limits and "
                          "its node id may be others then. Go on?", "the defaults come with its next reset: "
-                         f"canbase nmt {node} reset, or a power cycle"),
+                         f"canbase bus nmt {node} reset, or a power cycle"),
     }  # fmt: skip
     question, told = texts[what]
     status_at = status_places(node, robot)

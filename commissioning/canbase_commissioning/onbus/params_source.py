@@ -63,7 +63,7 @@ def read_drive(
 def result_of(task: NodeTask[T], line: BusSession) -> T:
     """What came of the transfers; exits with 1 where nothing did."""
     if isinstance(task.error, SdoTimeout):
-        fail(f"{task.error}. {line.problem or 'Power, cable, node id? canbase scan shows who answers'}", FAILED)
+        fail(f"{task.error}. {line.problem or 'Power, cable, node id? canbase bus scan shows who answers'}", FAILED)
     if isinstance(task.error, SdoAborted):
         fail(f"{task.error}; {ABORT_ADVICE.get(task.error.code, 'see the manual of the drive')}", FAILED)
     if task.result is None:

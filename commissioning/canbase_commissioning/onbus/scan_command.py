@@ -1,4 +1,4 @@
-"""`canbase scan` on the bus, and its table. What is queried and concluded is in `commissioning`."""
+"""`canbase bus scan` on the bus, and its table. What is queried and concluded is in `commissioning`."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def run(
     if problem or len(absent) == len(rows):
         fail(
             problem
-            or "no node sends or answers; check power, cable, termination, bit rate (canbase adopt searches it)",
+            or "no node sends or answers; check power, cable, termination, bit rate (canbase bus adopt searches it)",
             FAILED,
         )
     if absent:
@@ -60,7 +60,7 @@ def _explain(roster: Identification, heard: Listener, errors: int) -> None:
     for reason in roster.lost.values():
         typer.echo(f"lost while it was read: {reason}", err=True)
     if errors:
-        advice = "two drives with one node id, cable, termination, or a drive with another bit rate (canbase adopt)"
+        advice = "two drives with one node id, cable, termination, or a drive with another bit rate (canbase bus adopt)"
         typer.echo(f"{errors} errors on the wire meanwhile: {advice}?", err=True)
 
 

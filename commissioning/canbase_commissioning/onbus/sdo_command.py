@@ -1,4 +1,4 @@
-"""`canbase sdo` on the bus. What is read and refused is decided in `commissioning/sdo_access.py`."""
+"""`canbase bus sdo` on the bus. What is read and refused is decided in `commissioning/sdo_access.py`."""
 
 from __future__ import annotations
 
@@ -160,9 +160,9 @@ def _who_answers(line: BusSession, node: int, heard: Listener) -> str:
     question = Conversation(read(ALL, 0x1000, 0, SLOW_BITRATE, attempts=1))
     line.run(question)
     if question.result is None:
-        return "Power, cable, node id? canbase scan shows who answers"
+        return "Power, cable, node id? canbase bus scan shows who answers"
     nodes = ", ".join(map(str, question.result)) or "none"
-    return f"Nodes that answer SDO: {nodes}. Power, cable, node id, bit rate? canbase scan shows more"
+    return f"Nodes that answer SDO: {nodes}. Power, cable, node id, bit rate? canbase bus scan shows more"
 
 
 def _or_wrong_value(do: Callable[[], object]) -> None:

@@ -19,8 +19,8 @@ COMMANDS: Final = {
 """By the index of the first axis: what moves a motor or its surroundings."""
 SERVICES: Final = {
     0x1003: "the error history",
-    0x1010: "stores parameters: canbase params store",
-    0x1011: "restores defaults: canbase params defaults",
+    0x1010: "stores parameters: canbase bus params store",
+    0x1011: "restores defaults: canbase bus params defaults",
     0x1023: "operating system commands", 0x1024: "operating system commands", 0x1025: "operating system commands",
     0x1026: "operating system prompt",
     0x1F50: "a program", 0x1F51: "controls a program", 0x1F56: "a program",

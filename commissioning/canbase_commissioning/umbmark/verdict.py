@@ -77,7 +77,7 @@ def check(found: Fit, old: Wheels) -> None:
         if abs(new_m / old_m - 1.0) > MOST_CHANGE:
             raise FitError(
                 f"the {name} would change from {old_m:.4g} to {new_m:.4g} m, by more than {100 * MOST_CHANGE:.0f} %: "
-                "run canbase commission first (a diameter for a radius, a gear ratio, another wheel?)"
+                "run canbase setup commission first (a diameter for a radius, a gear ratio, another wheel?)"
             )
 
 

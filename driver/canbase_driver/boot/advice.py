@@ -68,7 +68,8 @@ NOT_AN_AXIS = (
 )
 UNANSWERED = (
     "It answered before, so its node id and the bit rate are right, and the boot is tried again each second. If this "
-    "goes on, check its supply and its cable, and let no other program use its SDO channel (canbase sdo, the maker's "
+    "goes on, check its supply and its cable, and let no other program use its SDO channel (canbase bus "
+    "sdo, the maker's "
     "tool)"
 )
 ELSE_UNUSABLE = "where that cannot be done, the drive cannot be used"
@@ -129,7 +130,7 @@ def hint(error: SdoError) -> str:
         return OTHER_STATE
     if index == 0x6060 and code not in (NO_OBJECT, NO_SUB_INDEX, *WIDTHS):
         return (
-            "Set `mode` in robot.yaml to one that the drive has: in 6502h (canbase sdo read "
+            "Set `mode` in robot.yaml to one that the drive has: in 6502h (canbase bus sdo read "
             f"{error.node_id} 6502), bit 2 is mode 3, bit 8 is mode 9; "
             "bit 1 is mode 2, with `modes: [2]` in its drive profile; with none of them the drive cannot be used"
         )
@@ -160,12 +161,13 @@ def _spared(index: int, sub: int) -> str:
 
 
 def in_digits(step: Write) -> str:
-    """ "6007h:0 to 0003h": the object and its value, as maker's tools and canbase sdo show it."""
+    """ "6007h:0 to 0003h": the object and its value, as maker's tools and canbase bus sdo show it."""
     return f"{step} to {int.from_bytes(step.data, 'little'):0{2 * len(step.data)}X}h"
 
 
 def without(step: Write, *, lacks_it: bool = False) -> str:
-    """What it means for the robot, and what helps: a proof by `canbase commission` counts where the drive lacks it."""
+    """What it means for the robot, and what helps: a proof by `canbase setup commission` counts where the drive lacks
+    it."""
     index = _first_axis(step.index)
     if beside := BESIDES.get((index, step.sub), ""):
         return f"; so {beside}" + (f": set {in_digits(step)} with the maker's tool" if not lacks_it else "")
@@ -173,7 +175,7 @@ def without(step: Write, *, lacks_it: bool = False) -> str:
     if not meaning:
         return ""
     by_hand = f"set {in_digits(step)} with the maker's tool"
-    cure = "canbase commission shows whether it stops in another way" if lacks_it else by_hand
+    cure = "canbase setup commission shows whether it stops in another way" if lacks_it else by_hand
     if index in FOR_SELF_STOP:
         return f"; so {meaning}: {cure}, else only a wired STO does"
     return f"; so {meaning}" if lacks_it else f"; so {meaning}: {cure}"

@@ -150,7 +150,8 @@ class NodeBoot:
                 "each request is answered twice: two devices on the bus have this node id, or a gateway repeats it"
             )
             hint = (
-                "Give each drive a node id of its own (canbase scan names them, canbase adopt sets them). If one drive "
+                "Give each drive a node id of its own (canbase bus scan names them, canbase bus adopt "
+                "sets them). If one drive "
                 "alone has it, take out the gateway, the bridge or the second interface that sends frames again"
             )
             self._end(error=BootError(self.node_id, problem, hint))

@@ -30,7 +30,7 @@ def check_scale(node: NodeAccess, drive: Drive, *, identify: bool) -> Steps[tupl
     if unclear := undecided(objects, measured):
         node.notes.append(
             f"{', '.join(unclear)} of {drive.joint}: it cannot be decided whether velocity_unit and "
-            "counts_per_motor_rev fit; canbase commission --steps directions,scale shows it"
+            "counts_per_motor_rev fit; canbase setup commission --steps directions,scale shows it"
         )
     return scale
 
@@ -87,7 +87,7 @@ def _name(index: int) -> str:
 def _cure(drive: Drive, expected: Expected) -> str:
     return (
         "The drive has lost or changed its settings, and would turn its wheel otherwise than ordered: set them again "
-        f"(canbase params restore, or the maker's tool). If the change is meant, take {expected.index:04X}h:"
+        f"(canbase bus params restore, or the maker's tool). If the change is meant, take {expected.index:04X}h:"
         f"{expected.sub} out of `expects` of {drive.joint} in robot.yaml, and then, with the wheels up: canbase "
         "commission --steps directions,scale"
     )

@@ -56,7 +56,7 @@ class StopsBy(Enum):
     WATCHDOG_HEARTBEAT = "heartbeat of the watchdog"
     NODE_GUARDING = "node guarding by the watchdog"
     OWN_TIMEOUT = "the drive's own command timeout"
-    AS_PROVEN = "as canbase commission has proven"
+    AS_PROVEN = "as canbase setup commission has proven"
 
 
 @dataclass(frozen=True, slots=True)
@@ -344,7 +344,7 @@ def _set_vendor_watchdog(node: NodeAccess, kind: Profile, robot: Robot) -> Steps
     if watchdog.index is None:
         node.notes.append(
             f"the drive's own watchdog: {watchdog.text}; it needs {1000 * timeout_s:.0f} ms "
-            "(timeouts.drive_heartbeat_s); canbase commission proves it"
+            "(timeouts.drive_heartbeat_s); canbase setup commission proves it"
         )
         return ""
     write = Write(watchdog.index, watchdog.sub, round(watchdog.per_s * timeout_s), watchdog.bits // 8)
@@ -352,7 +352,7 @@ def _set_vendor_watchdog(node: NodeAccess, kind: Profile, robot: Robot) -> Steps
         return ""
     if kind.is_unproven("self_stop.vendor_watchdog") and not is_proven(robot):
         node.notes.append(
-            f"{write}: {watchdog.text} is set, but not proven to stop the motor: canbase commission proves it"
+            f"{write}: {watchdog.text} is set, but not proven to stop the motor: canbase setup commission proves it"
         )
         return ""
     return f"{watchdog.text} ({write})"

@@ -41,7 +41,7 @@ HOLD_S = 0.2
 """After the last NMT "enter pre-operational" it is left alone this long [s]; the watchdog repeats it every 0.05 s."""
 HELD = (
     "NMT commands keep it pre-operational: the watchdog's while it stops drives that still turn, or those of another "
-    "master (canbase scan), which must end"
+    "master (canbase bus scan), which must end"
 )
 RETRY_S = 1.0
 """Between two boots of a node that failed."""

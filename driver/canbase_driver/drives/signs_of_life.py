@@ -66,7 +66,8 @@ class SignsOfLife:
         if now_s - self._since <= STARTING_S:
             return f"{sent}: it may still be starting, and the boot goes on by itself"
         return (
-            f"{sent}, but it answers no request of the boot: let no other program use its SDO channel (canbase sdo, "
+            f"{sent}, but it answers no request of the boot: let no other program use its SDO channel "
+            f"(canbase bus sdo, "
             "the maker's tool); then switch the drive off and on again"
         )
 

@@ -61,7 +61,7 @@ BLOCKERS: tuple[Blocker, ...] = (
     Blocker(Cause.NOT_CONFIGURED, lambda s: s.unconfigured, Phase.OFFLINE, "lifecycle transition configure"),
     Blocker(Cause.DRIVE_MISSING, lambda s: s.missing, Phase.BOOTING, "the drive answering"),
     Blocker(Cause.BOOTING, lambda s: s.booting or s.absent, Phase.BOOTING, "drives booted"),
-    Blocker(Cause.STOP_UNPROVEN, lambda s: s.unproven, Phase.DISARMED, "canbase commission, and a new start"),
+    Blocker(Cause.STOP_UNPROVEN, lambda s: s.unproven, Phase.DISARMED, "canbase setup commission, and a new start"),
     Blocker(Cause.DRIVE_FAULT, lambda s: s.fault, Phase.LATCHED, "reset, with the drive's cause gone"),
     Blocker(Cause.DRIVE_SILENT, lambda s: s.silent, Phase.DISARMED, "the drive answering"),
     Blocker(Cause.WATCHDOG_MISSING, _MISSING, Phase.DISARMED, "the watchdog alive"),

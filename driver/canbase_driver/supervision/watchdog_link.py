@@ -225,7 +225,7 @@ class WatchdogLink:
     def view(self, now_s: float) -> tuple[WatchdogView, str]:
         """Whether it watches, and a sentence when it does not."""
         if self._state is None:
-            return WatchdogView.MISSING, "no frame of it yet; start it with `canbase watchdog`"
+            return WatchdogView.MISSING, "no frame of it yet; start it with `canbase serve watchdog`"
         age_s = now_s - self._received_s
         if age_s > self._timeout_s:
             return WatchdogView.MISSING, f"no frame for {age_s:.2f} s (timeout {self._timeout_s:.2f} s)"

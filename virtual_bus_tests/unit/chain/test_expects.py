@@ -74,7 +74,7 @@ def test_a_drive_that_has_lost_it_gets_no_power(monkeypatch: pytest.MonkeyPatch,
     assert world.core.state is not DriverState.ENABLED
     problem = world.snapshot.drives[0].boot_problem
     assert f"607Eh:0 (polarity) of left_wheel is {value}, and was 0 when its wheel was measured" in problem
-    assert "canbase params restore" in problem
+    assert "canbase bus params restore" in problem
     assert "take 607Eh:0 out of `expects` of left_wheel in robot.yaml" in problem
 
 

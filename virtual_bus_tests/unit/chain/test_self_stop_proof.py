@@ -22,7 +22,7 @@ from support.chain_world import World
 from support.crews import robot_with
 
 PROOF: tuple[Step, ...] = ("proof",)
-PROVE = "With the wheels up: canbase commission --steps proof"
+PROVE = "With the wheels up: canbase setup commission --steps proof"
 
 
 def boots(robot: Robot) -> dict[int, BootReport]:
@@ -45,7 +45,7 @@ class File:
         return load_robot(self.path).robot
 
     def prove(self) -> None:
-        """As `canbase commission --steps proof` writes it."""
+        """As `canbase setup commission --steps proof` writes it."""
         robot = self.robot
         edits = identity_edits(robot, boots(robot))
         self.edit(*edits, *commissioned_edits(robot, edits, PROOF))
@@ -68,7 +68,7 @@ def blocked(robot: Robot) -> str:
     finding = world.core.finding
     assert not any(world.powered)
     assert (world.core.state, finding.cause.value) == (DriverState.DISARMED, "stop unproven")
-    assert finding.clears_on == "canbase commission, and a new start"
+    assert finding.clears_on == "canbase setup commission, and a new start"
     return finding.detail
 
 
@@ -202,8 +202,8 @@ def proven(kind: str, identity: int = 0x100) -> Robot:
         ("generic", "heartbeat of the watchdog (1016h, 6007h)"),
         ("technosoft", "node guarding by the watchdog (100Ch, 100Dh, 6007h)"),
         ("zlac8015d", "communication offline time (2000h:0)"),
-        ("roboteq", "as canbase commission has proven"),
-        ("tmcm1636", "as canbase commission has proven"),
+        ("roboteq", "as canbase setup commission has proven"),
+        ("tmcm1636", "as canbase setup commission has proven"),
     ],
 )
 def test_what_was_proven_counts_where_the_boot_cannot_see_it(kind: str, by: str) -> None:
@@ -252,7 +252,7 @@ def test_a_proof_of_drives_without_a_serial_number_is_about_their_kind_and_that_
     file.edit(*commissioned_edits(file.robot, (), PROOF))
     why = (
         "left_wheel: 1018h:4 has no serial number, so the proof that it stops by itself is about its kind: after each "
-        "exchange of a drive repeat canbase commission --steps proof"
+        "exchange of a drive repeat canbase setup commission --steps proof"
     )
     assert without_proof(file.robot) == ""
     assert kind_alone(file.robot) == why

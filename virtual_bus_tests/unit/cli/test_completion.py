@@ -27,31 +27,31 @@ def bash(line: str) -> list[str]:
     return done.stdout.split()
 
 
-@pytest.mark.parametrize("command", ["sdo read", "sdo write"])
+@pytest.mark.parametrize("command", ["bus sdo read", "bus sdo write"])
 def test_node_ids_of_the_robot_that_the_line_names(command: str, file: Path) -> None:
     assert bash(f"canbase {command} --config {file} ") == ["11", "12"]
     assert bash(f"canbase {command} -c {file} 12") == ["12"]
     assert bash(f"canbase {command} -c {file} 2") == []
 
 
-def test_without_one_those_of_the_bench() -> None:
-    assert bash("canbase sdo read ") == ["1", "2"]
-    assert bash("canbase jog ") == ["left_wheel", "right_wheel"]
+def test_without_one_those_of_the_robot_that_is_meant() -> None:
+    assert bash("canbase bus sdo read ") == ["1", "2"]
+    assert bash("canbase bus jog ") == ["left_wheel", "right_wheel"]
 
 
 def test_joints_of_the_robot_that_the_line_names(file: Path) -> None:
-    assert bash(f"canbase jog --config {file} s") == ["starboard"]
+    assert bash(f"canbase bus jog --config {file} s") == ["starboard"]
 
 
 def test_zsh_shows_what_belongs_to_them(file: Path) -> None:
-    asked = {"_CANBASE_COMPLETE": "complete_zsh", "_TYPER_COMPLETE_ARGS": f"canbase sdo read -c {file} "}
+    asked = {"_CANBASE_COMPLETE": "complete_zsh", "_TYPER_COMPLETE_ARGS": f"canbase bus sdo read -c {file} "}
     told = CliRunner().invoke(app, env=asked, prog_name="canbase").stdout
     assert '"11":"port"' in told
     assert '"12":"starboard"' in told
 
 
 def test_steps_of_a_commissioning_one_after_the_other(file: Path) -> None:
-    line = f"canbase commission --config {file} --steps "
+    line = f"canbase setup commission --config {file} --steps "
     assert bash(line) == ["directions", "scale", "proof", "floor"]
     assert bash(f"{line}directions,") == ["directions,scale", "directions,proof", "directions,floor"]
     assert bash(f"{line}directions,p") == ["directions,proof"]
@@ -62,4 +62,4 @@ def test_a_file_that_is_no_robot_proposes_nothing_and_says_nothing(content: str 
     file = tmp_path / "robot.yaml"
     if content is not None:
         file.write_text(content, encoding="utf-8")
-    assert bash(f"canbase jog --config {file} ") == []
+    assert bash(f"canbase bus jog --config {file} ") == []

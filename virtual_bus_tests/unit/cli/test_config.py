@@ -48,14 +48,14 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, module_name: str, exit_code: int =
 
 
 @pytest.mark.parametrize(("command", "module"), ROS_COMMANDS)
-def test_without_options_a_process_gets_the_bench_and_no_ros_arguments(
+def test_without_options_a_process_gets_the_robot_that_is_meant_and_no_ros_arguments(
     command: str, module: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = stand_in(monkeypatch, module)
 
     result = CliRunner().invoke(app, [command])
 
-    assert (result.exit_code, result.output) == (0, "")
+    assert (result.exit_code, result.stdout) == (0, "")
     assert calls == [(load_robot(sample("bench")).robot, [])]
 
 
@@ -89,7 +89,7 @@ def test_a_namespace_is_written_with_or_without_its_slashes(
 ) -> None:
     calls = stand_in(monkeypatch, "canbase_driver.runtime.main")
 
-    CliRunner().invoke(app, ["driver", "-n", given])
+    CliRunner().invoke(app, ["serve", "driver", "-n", given])
 
     assert [got for _, got in calls] == [arguments]
 
@@ -98,7 +98,7 @@ def test_a_namespace_is_written_with_or_without_its_slashes(
 def test_a_namespace_that_ros_would_refuse_is_refused_here(namespace: str, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = stand_in(monkeypatch, "canbase_driver.runtime.main")
 
-    result = CliRunner().invoke(app, ["driver", "-n", namespace])
+    result = CliRunner().invoke(app, ["serve", "driver", "-n", namespace])
 
     assert (result.exit_code, calls) == (2, [])
     assert "is no ROS namespace" in result.stderr
@@ -107,7 +107,7 @@ def test_a_namespace_that_ros_would_refuse_is_refused_here(namespace: str, monke
 def test_a_mistyped_option_before_the_ros_arguments_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = stand_in(monkeypatch, "canbase_driver.runtime.main")
 
-    result = CliRunner().invoke(app, ["driver", "--confg", "x.yaml", "--ros-args", "-r", "a:=b"])
+    result = CliRunner().invoke(app, ["serve", "driver", "--confg", "x.yaml", "--ros-args", "-r", "a:=b"])
 
     assert (result.exit_code, calls) == (2, [])
     assert "No such option: --confg" in result.stderr
@@ -128,7 +128,7 @@ def test_a_broken_robot_yaml_starts_no_process(command: str, tmp_path: Path, mon
     monkeypatch.setattr(os, "execve", lambda *arguments: calls.append([arguments]))
     file = write(tmp_path, {9: "    gear_ratio: 0"})
 
-    result = CliRunner().invoke(app, [command, "--config", str(file)])
+    result = CliRunner().invoke(app, ["serve", command, "--config", str(file)])
 
     assert (result.exit_code, calls) == (2, [[], [], [], []])
     assert result.stderr.startswith(f"{file}:9: drives[0].gear_ratio: got 0, expected a number > 0 and <= 10000")
@@ -139,8 +139,10 @@ def test_the_simulation_gets_its_control_socket(tmp_path: Path, monkeypatch: pyt
     calls = stand_in(monkeypatch, "canbase_sim.main")
     file = write(tmp_path, {})
 
-    CliRunner().invoke(app, ["sim", "-c", str(file), "--control", "/tmp/control.sock", "--namespace", "robot1"])
-    CliRunner().invoke(app, ["sim", "-c", str(file), "--ros-args", "-r", "a:=b"])
+    CliRunner().invoke(
+        app, ["serve", "sim", "-c", str(file), "--control", "/tmp/control.sock", "--namespace", "robot1"]
+    )
+    CliRunner().invoke(app, ["serve", "sim", "-c", str(file), "--ros-args", "-r", "a:=b"])
 
     assert calls == [(load_robot(file).robot, "/tmp/control.sock"), (load_robot(file).robot, None)]
 
@@ -153,7 +155,7 @@ def test_the_watchdog_replaces_the_process_and_skips_the_start_up_hook(
     monkeypatch.delenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE", raising=False)
     file = write(tmp_path, {})
 
-    CliRunner().invoke(app, ["watchdog", "--config", str(file)])
+    CliRunner().invoke(app, ["serve", "watchdog", "--config", str(file)])
 
     ((executable, arguments, environment),) = calls
     assert executable == sys.executable
@@ -321,7 +323,7 @@ def test_without_ros_the_words_for_it_keep_no_watchdog_from_starting(monkeypatch
     monkeypatch.setattr(os, "execve", lambda *arguments: started.append(arguments))
     monkeypatch.setattr("canbase_cli.options.find_spec", lambda name: None)
 
-    assert CliRunner().invoke(app, ["watchdog", "--ros-args", "--bogus"]).exit_code == 0
+    assert CliRunner().invoke(app, ["serve", "watchdog", "--ros-args", "--bogus"]).exit_code == 0
     assert len(started) == 1
 
 
@@ -335,7 +337,7 @@ def test_a_ros_that_cannot_be_loaded_keeps_no_watchdog_from_starting(monkeypatch
 
     monkeypatch.setattr("canbase_cli.options.import_module", broken)
 
-    assert CliRunner().invoke(app, ["watchdog", "--ros-args", "-r", "__ns:=/robot"]).exit_code == 0
+    assert CliRunner().invoke(app, ["serve", "watchdog", "--ros-args", "-r", "__ns:=/robot"]).exit_code == 0
     assert len(started) == 1
 
 

@@ -1,4 +1,4 @@
-"""`canbase inject` and `canbase sample`: what they refuse, and what reaches the simulator."""
+"""`canbase inject` and `canbase print sample`: what they refuse, and what reaches the simulator."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def test_nothing_is_broken_on_a_real_bus(tmp_path: Path) -> None:
 
 
 def test_each_sample_is_printed_as_it_is() -> None:
-    assert canbase("sample") == (0, "\n".join(samples()) + "\n")
+    assert canbase("print", "sample") == (0, "\n".join(samples()) + "\n")
     for name in samples():
-        assert canbase("sample", name) == (0, sample(name).read_text())
-    code, text = canbase("sample", "bensh")
+        assert canbase("print", "sample", name) == (0, sample(name).read_text())
+    code, text = canbase("print", "sample", "bensh")
     assert (code, "there is no sample 'bensh'" in text) == (2, True)

@@ -245,7 +245,7 @@ def test_commands_and_states_are_never_written(eds: Eds) -> None:
     assert what.orders == ()
     assert {str(change.at): why for change, why in what.left} == {
         "1005h:0": "the drive would send SYNC itself, beside canbase's driver",
-        "1010h:1": "stores parameters: canbase params store",
+        "1010h:1": "stores parameters: canbase bus params store",
         "6040h:0": "the controlword",
         "6060h:0": "the mode, which the boot sets",
         "60FFh:0": "a target",

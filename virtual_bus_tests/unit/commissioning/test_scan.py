@@ -162,7 +162,7 @@ def test_two_drives_with_one_node_id_are_named_and_their_serial_numbers_are_not_
     (row, missing_one) = scan_rows({}, roster.cards, world.robot, roster.twins)
     assert row.what == "two drives or more: generic CiA 402 drive"
     assert missing_one.what == NOT_HERE
-    assert twins_advice(roster.twins).startswith("node 1: two drives or more answer. canbase adopt")
+    assert twins_advice(roster.twins).startswith("node 1: two drives or more answer. canbase bus adopt")
 
 
 def test_drives_with_a_node_id_each_are_no_twins() -> None:

@@ -122,7 +122,7 @@ def test_one_short_square_is_not_certain_enough() -> None:
 
 def test_a_diameter_for_a_radius_is_no_matter_of_calibration() -> None:
     truth = Truth(Wheels(0.08, 0.08, 0.5), MOUNT)
-    with pytest.raises(FitError, match=r"would change from 0.1 to 0.0[78]\d+ m.*canbase commission first"):
+    with pytest.raises(FitError, match=r"would change from 0.1 to 0.0[78]\d+ m.*canbase setup commission first"):
         check(fitted(legs_of(base_of(truth), open_squares(1.5, 4))), OLD)
 
 
@@ -220,7 +220,7 @@ def test_the_lines_have_old_and_new_values_and_how_the_squares_close() -> None:
 
 
 def called(*words: str, answer: str = "") -> tuple[int, str]:
-    ended = CliRunner().invoke(app, ["calibrate", *words], input=answer)
+    ended = CliRunner().invoke(app, ["setup", "calibrate", *words], input=answer)
     return ended.exit_code, ended.output
 
 

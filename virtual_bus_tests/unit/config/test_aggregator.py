@@ -113,7 +113,7 @@ def test_the_file_in_deploy_is_that_of_the_bench() -> None:
 
 
 def test_the_command_prints_it() -> None:
-    done = CliRunner().invoke(app, ["aggregator", str(sample("bench"))])
+    done = CliRunner().invoke(app, ["print", "aggregator", str(sample("bench"))])
     assert (done.exit_code, done.stdout) == (0, parameter_file(BENCH))
 
 

@@ -150,7 +150,7 @@ def test_until_then_no_corner_of_the_base_is_faster_than_safety_uncommissioned_m
     assert slower.twist.linear_mps == pytest.approx(robot.limits.linear_mps / 10.0)
     assert slower.cause is StopCause.SPEED
     assert "this robot is not commissioned (not done: directions, scale, proof, floor)" in slower.detail
-    assert slower.clears_on == "canbase commission"
+    assert slower.clears_on == "canbase setup commission"
     assert decide(replace(GOOD, command=turning), unknown).twist.angular_radps == pytest.approx(0.08 / (0.31 * 2**0.5))
 
 

@@ -69,7 +69,7 @@ def test_a_node_with_two_motors_has_no_identifier_to_spare_however_many_tpdos_it
     why = misfit([DriveValue.model_validate(value("a"))], 100.0, motors=2, tpdos=tpdos)
     assert "whose feedback has all four TPDO identifiers of a node (180h, 280h, 380h and 480h + id)" in why
     assert "the watchdog would read them as torque or velocity" in why
-    assert why.endswith("Take the values out, and read one by hand with `canbase sdo read NODE 2000:0`")
+    assert why.endswith("Take the values out, and read one by hand with `canbase bus sdo read NODE 2000:0`")
     with pytest.raises(ValidationError, match="values of left_wheel: its node turns two motors"):
         robot(value("a"), kind="zlac8015d")
 

@@ -1,4 +1,4 @@
-"""`canbase nav2`: what follows from a robot.yaml for Nav2, as parameters and as a launch file."""
+"""`canbase print nav2`: what follows from a robot.yaml for Nav2, as parameters and as a launch file."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def robot(name: str = "bench", **changes: Any) -> Robot:
 
 
 def canbase(*words: str) -> Result:
-    return CliRunner().invoke(app, ["nav2", *words])
+    return CliRunner().invoke(app, ["print", "nav2", *words])
 
 
 def laid(tmp_path: Path, text: str, *words: str) -> Any:

@@ -104,7 +104,7 @@ def test_every_parameter_that_we_print_is_one_of_nav2() -> None:
 
 
 def test_laid_into_nav2s_own_file_it_is_that_file_with_our_values() -> None:
-    result = CliRunner().invoke(app, ["nav2", "--params", str(PARAMS)])
+    result = CliRunner().invoke(app, ["print", "nav2", "--params", str(PARAMS)])
     before, after = yaml.safe_load(PARAMS.read_text(encoding="utf-8")), yaml.safe_load(result.stdout)
     ours = set(parameters(load_robot(sample("bench")).robot))
     assert set(_paths(before)) <= set(_paths(after))

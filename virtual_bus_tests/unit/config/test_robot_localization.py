@@ -1,4 +1,4 @@
-"""What `canbase ekf` prints for robot_localization: names, values, and what robot.yaml needs for it.
+"""What `canbase print ekf` prints for robot_localization: names, values, and what robot.yaml needs for it.
 
 `ROBOT_LOCALIZATION=/path/to/robot_localization pytest -k robot_localization` holds the names against that source; no
 text of it is in this repository.
@@ -85,7 +85,7 @@ def test_two_publishers_of_one_transform_are_reported_before_they_happen() -> No
 
 
 def test_the_command_prints_it_and_its_note() -> None:
-    result = CliRunner().invoke(app, ["ekf", "--imu", "imu/data"])
+    result = CliRunner().invoke(app, ["print", "ekf", "--imu", "imu/data"])
     assert result.exit_code == 0
     assert result.stdout == ekf(BENCH, "imu/data")
     assert result.stderr.startswith("note: the filter publishes odom → base_link")

@@ -1,4 +1,5 @@
-"""What `canbase urdf` prints for ros2_control: the tag of its topic hardware, parameters of diff_drive_controller."""
+"""What `canbase print urdf` prints for ros2_control: the tag of its topic hardware, parameters of
+diff_drive_controller."""
 
 from __future__ import annotations
 
@@ -118,7 +119,7 @@ def test_unequal_sides_and_a_missing_source_are_refused_with_the_cure() -> None:
     robot = with_sources(BENCH.model_copy(update={"drives": (*BENCH.drives, third)}), control=CONTROL)
     with pytest.raises(ValueError, match="as many wheels on each side; drives has 2 on the left, 1 on the right"):
         controllers(robot)
-    refused = CliRunner().invoke(app, ["urdf", "--controllers", str(sample("bench"))])
+    refused = CliRunner().invoke(app, ["print", "urdf", "--controllers", str(sample("bench"))])
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert "add below mux.sources, for example, control: {topic: joint_command, type: joint_command" in refused.stderr
 
@@ -129,6 +130,6 @@ def test_the_page_shows_what_the_command_prints_for_the_bench(tmp_path: Path) ->
     own = next(block for block in shown if block.startswith("mux:\n"))
     file = tmp_path / "robot.yaml"
     file.write_text(f"{sample('bench').read_text(encoding='utf-8')}\n{own}", encoding="utf-8")
-    printed = CliRunner().invoke(app, ["urdf", "--controllers", str(file)])
+    printed = CliRunner().invoke(app, ["print", "urdf", "--controllers", str(file)])
     assert (printed.exit_code, printed.stderr) == (0, "")
     assert printed.stdout in shown

@@ -104,12 +104,12 @@ def test_names_that_xml_does_not_take_as_they_are_come_back_unchanged() -> None:
 
 
 def test_the_command_prints_it_and_an_unusable_robot_yaml_ends_it_with_2(tmp_path: Path) -> None:
-    good = CliRunner().invoke(app, ["urdf", str(sample("bench"))])
+    good = CliRunner().invoke(app, ["print", "urdf", str(sample("bench"))])
     assert (good.exit_code, good.stdout) == (0, urdf(load_robot(sample("bench")).robot))
     twins = tmp_path / "robot.yaml"
     twins.write_text(sample("bench").read_text().replace("base:\n", "base:\n  base_frame: left_wheel_link\n", 1))
-    refused = CliRunner().invoke(app, ["urdf", "--config", str(twins)])
+    refused = CliRunner().invoke(app, ["print", "urdf", "--config", str(twins)])
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert "left_wheel_link" in refused.stderr
-    assert CliRunner().invoke(app, ["urdf", str(tmp_path / "none.yaml")]).exit_code == 2
-    assert CliRunner().invoke(app, ["urdf", str(twins), "--config", str(twins)]).exit_code == 2
+    assert CliRunner().invoke(app, ["print", "urdf", str(tmp_path / "none.yaml")]).exit_code == 2
+    assert CliRunner().invoke(app, ["print", "urdf", str(twins), "--config", str(twins)]).exit_code == 2

@@ -1,4 +1,4 @@
-"""`canbase install` and `uninstall` as data: which files, links and commands they consist of."""
+"""`canbase setup install` and `uninstall` as data: which files, links and commands they consist of."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_no_placeholder_is_left_in_a_unit() -> None:
     units = {path: text for path, text in texts(install_plan(request(), {})).items() if path.startswith(UNITS)}
 
     assert [path for path, text in units.items() if "@PYTHON@" in text] == []
-    assert "ExecStart=/opt/canbase/bin/python -m canbase_cli driver" in units[f"{UNITS}/canbase-driver@.service"]
+    assert "ExecStart=/opt/canbase/bin/python -m canbase_cli serve driver" in units[f"{UNITS}/canbase-driver@.service"]
 
 
 def test_a_robot_starts_at_boot_and_its_interface_with_the_adapter() -> None:

@@ -1,4 +1,4 @@
-"""`canbase install` and `uninstall` carried out below a folder, without root: the first time, again, and gone."""
+"""`canbase setup install` and `uninstall` carried out below a folder, without root: the first time, again, and gone."""
 
 from __future__ import annotations
 
@@ -196,10 +196,10 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
 def test_the_commands(tmp_path: Path) -> None:
     runner = CliRunner()
 
-    installed = runner.invoke(app, ["install", "--config", str(EXAMPLE), "--prefix", str(tmp_path)])
-    refused = runner.invoke(app, ["install", "--config", str(sample("bench")), "--prefix", str(tmp_path)])
-    unknown = runner.invoke(app, ["uninstall", "nobody", "--prefix", str(tmp_path)])
-    removed = runner.invoke(app, ["uninstall", "example", "--prefix", str(tmp_path), "--purge"])
+    installed = runner.invoke(app, ["setup", "install", "--config", str(EXAMPLE), "--prefix", str(tmp_path)])
+    refused = runner.invoke(app, ["setup", "install", "--config", str(sample("bench")), "--prefix", str(tmp_path)])
+    unknown = runner.invoke(app, ["setup", "uninstall", "nobody", "--prefix", str(tmp_path)])
+    removed = runner.invoke(app, ["setup", "uninstall", "example", "--prefix", str(tmp_path), "--purge"])
 
     codes = [result.exit_code for result in (installed, refused, unknown, removed)]
     assert codes == [0, 2, 2, 0]

@@ -1,4 +1,5 @@
-"""`canbase install` with a robot.yaml that names files of its own: they are installed, upgraded and removed with it."""
+"""`canbase setup install` with a robot.yaml that names files of its own: they are installed, upgraded and removed
+with it."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ def canbase(*arguments: str) -> tuple[int, str]:
 
 
 def install(root: Path, *options: str) -> tuple[int, str]:
-    return canbase("install", "--prefix", str(root), *options)
+    return canbase("setup", "install", "--prefix", str(root), *options)
 
 
 @pytest.fixture
@@ -102,7 +103,7 @@ def test_an_upgrade_keeps_what_the_owner_changed_in_them(robot: Path, root: Path
 def test_uninstall_keeps_them_with_robot_yaml_and_purge_removes_them_with_it(robot: Path, root: Path) -> None:
     etc = root / "etc/canbase"
     install(root, "--config", str(robot))
-    canbase("uninstall", "example", "--prefix", str(root))
+    canbase("setup", "uninstall", "example", "--prefix", str(root))
     assert load_robot(etc / "example.yaml").robot.name == "example"
     assert not (root / "etc/tmpfiles.d/canbase-example.conf").exists()
 
@@ -110,7 +111,7 @@ def test_uninstall_keeps_them_with_robot_yaml_and_purge_removes_them_with_it(rob
     (etc / "drives/mine.yaml.old").write_text("older\n")
     (etc / "example.yaml.old").write_text("older\n")
     install(root, "--name", "example")
-    canbase("uninstall", "example", "--prefix", str(root), "--purge")
+    canbase("setup", "uninstall", "example", "--prefix", str(root), "--purge")
     assert list(etc.iterdir()) == []
 
 

@@ -1,4 +1,5 @@
-"""What `canbase install` finds out about the machine: ROS 2, and whether the services would start with this Python."""
+"""What `canbase setup install` finds out about the machine: ROS 2, and whether the services would start with this
+Python."""
 
 from __future__ import annotations
 

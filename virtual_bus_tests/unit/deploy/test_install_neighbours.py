@@ -1,4 +1,5 @@
-"""`canbase install` beside robots that are installed: no bus, lease socket, name, place in ROS or file for two."""
+"""`canbase setup install` beside robots that are installed: no bus, lease socket, name, place in ROS or file for
+two."""
 
 from __future__ import annotations
 
@@ -25,12 +26,14 @@ def install(
     home.mkdir(exist_ok=True)
     (home / "mine.yaml").write_text(profile)
     (home / "robot.yaml").write_text(text)
-    done = CliRunner().invoke(app, ["install", "--config", str(home / "robot.yaml"), "--prefix", str(root), *words])
+    done = CliRunner().invoke(
+        app, ["setup", "install", "--config", str(home / "robot.yaml"), "--prefix", str(root), *words]
+    )
     return done.exit_code, done.output
 
 
 def uninstall(root: Path, name: str) -> int:
-    return CliRunner().invoke(app, ["uninstall", name, "--prefix", str(root)]).exit_code
+    return CliRunner().invoke(app, ["setup", "uninstall", name, "--prefix", str(root)]).exit_code
 
 
 def snapshot(root: Path) -> dict[Path, bytes]:
@@ -56,7 +59,7 @@ def test_a_robot_that_was_renamed_is_refused_until_the_old_one_is_gone(
 
     code, said = install(tmp_path / "home", root, *replaced)
     assert code == 2
-    assert "`sudo canbase uninstall example`" in said
+    assert "`sudo canbase setup uninstall example`" in said
     assert told in said
     assert snapshot(root) == before
 
@@ -146,7 +149,7 @@ def test_a_neighbour_that_cannot_be_read_may_be_on_any_bus(tmp_path: Path) -> No
     code, said = install(tmp_path, root, NAME, CHANNEL, LEASE)
 
     assert code == 2
-    assert "`sudo canbase uninstall example`" in said
+    assert "`sudo canbase setup uninstall example`" in said
 
 
 def test_robots_of_one_kind_share_a_profile_and_none_changes_that_of_another(tmp_path: Path) -> None:

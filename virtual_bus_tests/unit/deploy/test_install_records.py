@@ -1,4 +1,4 @@
-"""`canbase install` begins with clear records of stops, for a robot that never had any."""
+"""`canbase setup install` begins with clear records of stops, for a robot that never had any."""
 
 from __future__ import annotations
 

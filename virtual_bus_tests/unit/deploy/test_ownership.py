@@ -1,4 +1,4 @@
-"""What the services and root run belongs to root, up to the top folder: what `canbase install` refuses."""
+"""What the services and root run belongs to root, up to the top folder: what `canbase setup install` refuses."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ def test_a_python_of_a_user_is_not_run_before_it_is_refused(tmp_path: Path) -> N
     os.chown(python, 54321, 54321)
 
     options = ["--config", str(sample("example_can0")), "--python", str(python), "--dry-run"]
-    done = CliRunner().invoke(app, ["install", *options])
+    done = CliRunner().invoke(app, ["setup", "install", *options])
 
     assert done.exit_code == 2
     assert f"{python} belongs to the user 54321: sudo chown -R root:root {python}" in done.output

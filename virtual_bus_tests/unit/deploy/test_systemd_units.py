@@ -31,7 +31,7 @@ EXPOSURE = {"can": 1.8, "watchdog": 1.2, "driver": 1.4, "velocity": 1.3, "action
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A root with the services of the example robot, as `canbase install --prefix` makes it."""
+    """A root with the services of the example robot, as `canbase setup install --prefix` makes it."""
     root = tmp_path_factory.mktemp("root")
     path = sample("example_can0")
     templates, ros = read_templates(TEMPLATES), {"PYTHONPATH": '/opt/my ros/100% "x":/opt/ws'}

@@ -22,7 +22,7 @@ LOAD = "payload_kg: 30.0\n"
 
 
 def install(root: Path, *options: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, ["install", "--prefix", str(root), *options])
+    done = CliRunner().invoke(app, ["setup", "install", "--prefix", str(root), *options])
     return done.exit_code, done.output
 
 
@@ -63,7 +63,7 @@ def test_a_new_required_key_is_named_with_the_way_to_write_it_and_nothing_change
     path = installed / "etc/canbase/example.yaml"
     assert f"{path} cannot be used: 1 problem" in said
     assert "Nothing was changed: what is installed goes on as it is." in said
-    assert f"Write into a copy of {path} what is missing, then: sudo canbase install --config COPY" in said
+    assert f"Write into a copy of {path} what is missing, then: sudo canbase setup install --config COPY" in said
     assert snapshot(installed) == before
 
 

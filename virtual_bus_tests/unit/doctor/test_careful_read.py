@@ -161,7 +161,7 @@ def test_a_robot_yaml_with_mistakes_is_collected_with_them(
     config, output = tmp_path / "robot.yaml", tmp_path / "b.tar.gz"
     config.write_text(text)
 
-    done = CliRunner().invoke(app, ["support-bundle", "--config", str(config), "--output", str(output)])
+    done = CliRunner().invoke(app, ["record", "bundle", "--config", str(config), "--output", str(output)])
 
     assert done.exit_code == 0, done.output
     assert f"{config} cannot be used; collected all the same:" in done.stderr

@@ -1,4 +1,4 @@
-"""`canbase doctor` about `canbase metrics`: a row where it runs or should, none where nobody asked for it."""
+"""`canbase doctor` about `canbase serve metrics`: a row where it runs or should, none where nobody asked for it."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def test_a_loop_is_shown_from_node_to_node() -> None:
                                      ("velocity_smoother", "velocity_mux"))})  # fmt: skip
     loop = "collision_monitor → cmd_vel_nav → velocity_smoother → cmd_vel_smoothed → collision_monitor"
     assert told[0][0] == f"a loop: {loop}"
-    assert "canbase nav2 --launch" in told[0][1]
+    assert "canbase print nav2 --launch" in told[0][1]
     assert told[1][0] == "velocity_mux reads /cmd_vel_nav before velocity_smoother has smoothed or checked it"
     assert told[2][0].endswith("has 2 publishers: controller_server and collision_monitor")
 
@@ -188,7 +188,7 @@ def test_a_speed_above_ours_is_named(speed: Any, value: float) -> None:
     row = speed_row({speed.key: (value,) * len(speed.units)})
     assert row.verdict is Verdict.WARN
     assert row.found.count(f"{speed.node} {speed.parameter} is {value:g}") == sum(map(bool, speed.units))
-    assert "canbase nav2" in row.advice
+    assert "canbase print nav2" in row.advice
 
 
 def test_a_speed_like_ours_is_good_and_no_answer_is_no_evidence() -> None:

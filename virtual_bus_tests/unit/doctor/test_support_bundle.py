@@ -123,6 +123,6 @@ def test_units_journal_and_can_statistics_are_asked_for() -> None:
 
 
 def test_help_names_the_command() -> None:
-    shown = subprocess.run([sys.executable, "-m", "canbase_cli", "support-bundle", "--help"], capture_output=True)
+    shown = subprocess.run([sys.executable, "-m", "canbase_cli", "record", "bundle", "--help"], capture_output=True)
     assert shown.returncode == 0
     assert b"--since" in shown.stdout

@@ -48,7 +48,8 @@ def test_two_hub_motors_on_one_controlword() -> None:
     assert notes_of(boot) == (
         "1016h: the drive monitors no heartbeat, and none stops it; where it has node guarding, set "
         "`self_stop.node_guarding: true` in its drive profile",
-        "2000h:0: communication offline time is set, but not proven to stop the motor: canbase commission proves it",
+        "2000h:0: communication offline time is set, but not proven to stop the motor: canbase setup "
+        "commission proves it",
     )
     assert boot.report is not None
     assert not boot.report.stops_by_itself

@@ -29,7 +29,7 @@ from support.fake_drive import robot as fake_robot
 
 BY_HAND = "with the maker's tool"
 NO_SELF_STOP = (
-    "or node guarding stops the motor: canbase commission shows whether it stops in another way, "
+    "or node guarding stops the motor: canbase setup commission shows whether it stops in another way, "
     "else only a wired STO does"
 )
 
@@ -122,7 +122,7 @@ def test_what_a_drive_refuses_of_its_self_stop_is_named_with_what_that_means(key
     """A proof by commissioning would not count: the drive has both objects, so it is not offered."""
     boot = boot_one_axis(FakeDrive(refuse={key: INVALID}))
     assert any(f"{so} {BY_HAND}, else only a wired STO does" in note for note in notes_of(boot))
-    assert "canbase commission" not in str(notes_of(boot))
+    assert "canbase setup commission" not in str(notes_of(boot))
     assert boot.report is not None
     assert not boot.report.stops_by_itself
 
@@ -399,7 +399,7 @@ def test_two_drives_with_one_node_id_are_named() -> None:
     assert text.startswith(
         "node 1: each request is answered twice: two devices on the bus have this node id, or a gatew"
     )
-    assert "canbase adopt" in text
+    assert "canbase bus adopt" in text
     assert "If one drive alone has it, take out the gateway" in text
 
 
@@ -443,7 +443,7 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
             (0x6060, 0),
             INVALID,
             "6060h:0: 0609 0030h value not valid",
-            "Set `mode` in robot.yaml to one that the drive has: in 6502h (canbase sdo read 1 6502)",
+            "Set `mode` in robot.yaml to one that the drive has: in 6502h (canbase bus sdo read 1 6502)",
         ),
         ((0x60FF, 0), INVALID, "60FFh:0: 0609 0030h", "let the drive take its commands from the bus"),
         ((0x60FF, 0), GENERAL_ERROR, "60FFh:0: 0800 0000h", "check `axis` in robot.yaml"),

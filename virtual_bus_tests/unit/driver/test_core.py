@@ -69,7 +69,7 @@ def test_the_command_is_taken_with_its_receive_time(core: DriverCore) -> None:
 def test_without_a_watchdog_a_reset_is_refused_at_once(core: DriverCore) -> None:
     outcomes: list[Outcome] = []
     core.request_reset(10.0, outcomes.append)
-    assert outcomes == [Outcome(False, "refused: watchdog: no frame of it yet; start it with `canbase watchdog`")]
+    assert outcomes == [Outcome(False, "refused: watchdog: no frame of it yet; start it with `canbase serve watchdog`")]
 
 
 def test_a_reset_asks_the_watchdog_in_every_cycle_until_it_answers(core: DriverCore) -> None:

@@ -46,7 +46,7 @@ def test_what_is_no_state_frame_is_dropped_and_does_not_keep_the_watchdog_alive(
 
 def test_before_the_first_frame_it_is_missing() -> None:
     silent = WatchdogLink(timeout_s=0.2)
-    assert silent.view(10.0) == (WatchdogView.MISSING, "no frame of it yet; start it with `canbase watchdog`")
+    assert silent.view(10.0) == (WatchdogView.MISSING, "no frame of it yet; start it with `canbase serve watchdog`")
     assert math.isnan(silent.age_s(10.0))
     assert silent.cause == "none"
     assert silent.answer() is None

@@ -1,4 +1,4 @@
-"""`canbase evidence`: the folder that it writes, and what it finds when somebody has changed that folder."""
+"""`canbase prove evidence`: the folder that it writes, and what it finds when somebody has changed that folder."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _known_time_and_software() -> Iterator[None]:
 
 
 def run(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, ["evidence", *map(str, words)], catch_exceptions=False)
+    done = CliRunner().invoke(app, ["prove", "evidence", *map(str, words)], catch_exceptions=False)
     return done.exit_code, done.stdout, done.stderr
 
 
@@ -349,7 +349,7 @@ def test_nothing_is_overwritten(folder: Path, robot_yaml: Path) -> None:
     ("option", "content", "said"),
     [
         ("--tests", "<html/>", "its root is <html>"),
-        ("--scan", "{}", "not what canbase scan --json prints"),
+        ("--scan", "{}", "not what canbase bus scan --json prints"),
         ("--scan", "[", "no JSON"),
         ("--recordings", None, "missing"),
         ("--qualification", None, "there is no such folder"),

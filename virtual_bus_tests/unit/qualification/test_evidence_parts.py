@@ -55,7 +55,7 @@ def test_a_value_that_was_changed_after_its_step_makes_the_proof_out_of_date() -
     assert (stale.standing, fine.standing) == (Standing.STALE, Standing.PRESENT)
     assert "floor" in stale.sentence
     assert "floor" not in fine.sentence
-    assert stale.cure == "canbase commission --config robot.yaml --steps floor"
+    assert stale.cure == "canbase setup commission --config robot.yaml --steps floor"
 
 
 def test_steps_that_were_not_done_are_named() -> None:

@@ -40,7 +40,7 @@ def test_a_file_that_is_none_is_named(tmp_path: Path, text: str) -> None:
 
 
 def test_a_folder_without_one_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FolderError, match="it is no folder of canbase qualify"):
+    with pytest.raises(FolderError, match="it is no folder of canbase prove qualify"):
         folder.read_about(tmp_path)
 
 

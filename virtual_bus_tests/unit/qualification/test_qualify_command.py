@@ -1,4 +1,4 @@
-"""`canbase qualify`: what it refuses, and one run as a log. What it runs: bus/test_qualify_processes.py."""
+"""`canbase prove qualify`: what it refuses, and one run as a log. What it runs: bus/test_qualify_processes.py."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ESTOP = next(place for place, each in enumerate(FAILURES) if each.key == ("emerg
 
 
 def called(*arguments: str) -> tuple[int, str]:
-    told = CliRunner().invoke(app, ["qualify", *arguments])
+    told = CliRunner().invoke(app, ["prove", "qualify", *arguments])
     return told.exit_code, " ".join(told.output.split())
 
 
@@ -56,7 +56,7 @@ def test_results_that_are_there_are_kept_and_nothing_to_resume_is_refused(tmp_pa
     code, text = called(file, "--out", str(tmp_path))
     assert (code, "has results already" in text) == (2, True)
     code, text = called(file, "--out", str(tmp_path / "none"), "--resume")
-    assert (code, "is no folder of canbase qualify" in text) == (2, True)
+    assert (code, "is no folder of canbase prove qualify" in text) == (2, True)
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:

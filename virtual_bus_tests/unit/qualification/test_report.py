@@ -108,7 +108,7 @@ def test_each_hazard_with_stops_has_its_line_and_its_command() -> None:
     killed = rows["driver killed or hung: motor_driver is killed or hangs."]
     assert killed[1:7] == ("1,000", "0.30 s", "0.50 s", "0.99 s", "1.00 s", "1.00 s")
     assert killed[11] == "99.7 %"
-    assert killed[-1] == "`canbase qualify robot.yaml --stop 1000`"
+    assert killed[-1] == "`canbase prove qualify robot.yaml --stop 1000`"
     assert rows[f"{STRANGE} (no row of the catalogue)"][1] == "5"
     assert rows["Ordinary stop: zero is ordered, nothing fails."][1] == "10"
 
@@ -135,11 +135,14 @@ def test_a_violation_has_its_command() -> None:
     report = made([scenario(7, "driver_dies", violations=(HELD,))])
     row = table(report, "violations", 1).rows[0]
     assert row[:5] == ("held", "1", "0.71 s", HELD.detail, "driver dies")
-    assert row[-1] == "`canbase qualify robot.yaml --scenario 7`"
+    assert row[-1] == "`canbase prove qualify robot.yaml --scenario 7`"
 
 
 def test_a_file_name_with_spaces_is_quoted() -> None:
-    assert told_by(setup(robot_file="my robot.yaml"), scenario(7)) == "`canbase qualify 'my robot.yaml' --scenario 7`"
+    assert (
+        told_by(setup(robot_file="my robot.yaml"), scenario(7))
+        == "`canbase prove qualify 'my robot.yaml' --scenario 7`"
+    )
 
 
 def test_a_robot_that_needs_no_scan_has_no_bound() -> None:

@@ -122,6 +122,6 @@ def test_exit_code_0_is_for_what_was_run_whole(amount: Amount | None, code: int,
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
-    told = CliRunner().invoke(app, ["qualify", str(sample("bench")), "--report", "--out", str(tmp_path)])
+    told = CliRunner().invoke(app, ["prove", "qualify", str(sample("bench")), "--report", "--out", str(tmp_path)])
     assert told.exit_code == 2
-    assert "no folder of canbase qualify" in told.output
+    assert "no folder of canbase prove qualify" in told.output

@@ -49,7 +49,7 @@ def test_a_line_in_the_middle_that_is_none_is_named_with_its_number(tmp_path: Pa
 
 
 def test_two_cannot_write_at_the_same_time(tmp_path: Path) -> None:
-    with ResultsFile(tmp_path), pytest.raises(ResultsError, match="another canbase qualify writes there"):
+    with ResultsFile(tmp_path), pytest.raises(ResultsError, match="another canbase prove qualify writes there"):
         ResultsFile(tmp_path)
     with ResultsFile(tmp_path):
         pass

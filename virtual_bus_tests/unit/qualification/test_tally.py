@@ -42,7 +42,7 @@ def test_a_violation_has_the_sentence_of_its_property_and_the_command_that_tells
     text = told(scenario, load=Load((1.0, 3.0), 0.05))
     assert "VIOLATED held, 1 times: after a latched stop" in text
     assert "scenario 637, driver_dies, cable_cut: held: 0.2 m/s while watchdog latched" in text
-    assert "canbase qualify robot.yaml --scenario 637 --payload 1..3 --slope 0.05" in text
+    assert "canbase prove qualify robot.yaml --scenario 637 --payload 1..3 --slope 0.05" in text
     assert "Every property held" not in text
 
 

@@ -1,4 +1,4 @@
-"""What the tests of canbase write into JUnit XML, so that `canbase evidence` knows what a passed test proves."""
+"""What the tests of canbase write into JUnit XML, so that `canbase prove evidence` knows what a passed test proves."""
 
 from __future__ import annotations
 

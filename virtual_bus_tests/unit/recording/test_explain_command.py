@@ -1,4 +1,4 @@
-"""`canbase explain`, `canbase export` and the page, on recordings of real processes on the bench."""
+"""`canbase explain`, `canbase record export` and the page, on recordings of real processes on the bench."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_nothing_in_a_recording_becomes_markup() -> None:
 
 def test_export_gives_foxglove_s_library_ros_messages_and_explain_reads_it_again(tmp_path: Path) -> None:
     target = tmp_path / "stop.mcap"
-    code, _, err = run("export", str(CABLE), "--config", BENCH, "--mcap", str(target))
+    code, _, err = run("record", "export", str(CABLE), "--config", BENCH, "--mcap", str(target))
     assert (code, "6 topics" in err) == (0, True)
     with target.open("rb") as stream:
         found = [
@@ -166,7 +166,7 @@ def test_export_gives_foxglove_s_library_ros_messages_and_explain_reads_it_again
     begins = next(message.log_time for _, _, message, _ in found) / 1e9
     assert begins == pytest.approx(1_795_554_225.9, abs=86_400)
 
-    assert run("export", str(CABLE), "--mcap", str(target))[0] == 2  # it exists
+    assert run("record", "export", str(CABLE), "--mcap", str(target))[0] == 2  # it exists
     asc, mcap = (json.loads(run("explain", str(file), "--config", BENCH, "--json")[1]) for file in (CABLE, target))
     assert asc["stops"][0]["cause"] == mcap["stops"][0]["cause"] == "node silent"
     assert mcap["stops"][0]["at_s"] - asc["stops"][0]["at_s"] == pytest.approx(0.0, abs=0.001)
@@ -175,7 +175,7 @@ def test_export_gives_foxglove_s_library_ros_messages_and_explain_reads_it_again
 
 def test_an_mcap_file_that_was_cut_is_read_up_to_there(tmp_path: Path) -> None:
     target, cut = tmp_path / "stop.mcap", tmp_path / "cut.mcap"
-    run("export", str(CABLE), "--mcap", str(target))
+    run("record", "export", str(CABLE), "--mcap", str(target))
     shutil.copy(target, cut)
     with cut.open("r+b") as file:
         file.truncate(target.stat().st_size // 2)

@@ -175,7 +175,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def replay(*arguments: object) -> tuple[int, str]:
-    found = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    found = CliRunner().invoke(app, ["record", "replay", *map(str, arguments)])
     return found.exit_code, found.output
 
 

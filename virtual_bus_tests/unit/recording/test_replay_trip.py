@@ -91,7 +91,7 @@ def test_another_configuration_trips_earlier_by_the_difference(folder: Path) -> 
 
 
 def run(*arguments: object) -> tuple[int, str]:
-    found = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    found = CliRunner().invoke(app, ["record", "replay", *map(str, arguments)])
     return found.exit_code, " ".join(found.output.split())
 
 

@@ -118,7 +118,7 @@ def test_the_same_configuration_as_another_one_changes_nothing(folder: Path, est
 
 
 def run(*arguments: object) -> tuple[int, str]:
-    found = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    found = CliRunner().invoke(app, ["record", "replay", *map(str, arguments)])
     return found.exit_code, " ".join(found.output.split())
 
 

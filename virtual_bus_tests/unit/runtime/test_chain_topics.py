@@ -21,7 +21,7 @@ def published() -> Iterator[tuple[str, str, str]]:
     """Topic, name of the type, and file of each publisher with a literal topic."""
     for file in sorted(ROOT.glob("*/**/*.py")):
         folder = file.relative_to(ROOT).parts[0]
-        if folder in ("virtual_bus_tests", "benchmarks") or folder.startswith("."):
+        if folder in ("virtual_bus_tests", "benchmarks", "build") or folder.startswith("."):
             continue
         text = file.read_text("utf-8")
         for call in ast.walk(ast.parse(text)) if "create_publisher" in text else ():

@@ -161,7 +161,7 @@ def taken(tmp_path: Path) -> Path:
 
 @pytest.mark.needs_root("give a folder to another user")
 def test_nothing_is_done_as_root_in_the_folder_of_another_user(taken: Path, tmp_path: Path) -> None:
-    """The lease socket, both writers of records, the first records and what `canbase install` writes."""
+    """The lease socket, both writers of records, the first records and what `canbase setup install` writes."""
     with pytest.raises(LeaseSocketError, match=f"belongs to user {STRANGER}"):
         LeaseSocket(str(taken / "lease"), os.getuid())
     file = LatchFile(taken / "carl", "driver", "carl")
@@ -300,13 +300,30 @@ def test_what_is_no_file_is_not_replaced(module: ModuleType, tmp_path: Path, aim
 
 @pytest.mark.needs_root("give a file to another user")
 def test_a_file_of_another_user_stays_with_that_user(module: ModuleType, tmp_path: Path) -> None:
-    """As robot.yaml of an integrator that `sudo canbase commission` changes."""
+    """As robot.yaml of an integrator that `sudo canbase setup commission` changes."""
     path = tmp_path / "file"
     path.touch(0o640)
     os.chown(path, STRANGER, STRANGER + 1)
     with module.replaced(path):
         pass
     assert (path.stat().st_uid, path.stat().st_gid, path.stat().st_mode & 0o777) == (STRANGER, STRANGER + 1, 0o640)
+
+
+def test_who_may_not_give_files_away_replaces_them_all_the_same(
+    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the driver's service replaces the stop file that root has written in the services' folder."""
+
+    def refused(*_words: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    path = tmp_path / "stop.json"
+    path.touch(0o640)
+    monkeypatch.setattr(os, "fchown", refused)
+    with module.replaced(path) as file:
+        file.write(b"new")
+    assert (path.read_bytes(), path.stat().st_mode & 0o777) == (b"new", 0o640)
+    assert [each.name for each in tmp_path.iterdir()] == ["stop.json"]
 
 
 OTHERWISE = {

@@ -106,7 +106,7 @@ def test_a_run_of_some_keeps_the_ratios_of_the_others(tmp_path: Path) -> None:
 def test_a_file_that_is_none_of_these_is_refused_before_anything_runs(tmp_path: Path, text: str) -> None:
     path = tmp_path / "other.json"
     path.write_text(text)
-    with pytest.raises(ValueError, match="was not written by `canbase benchmark --json`"):
+    with pytest.raises(ValueError, match="was not written by `canbase prove benchmark --json`"):
         kept.read(path)
 
 

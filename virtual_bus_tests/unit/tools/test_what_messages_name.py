@@ -92,12 +92,12 @@ def test_every_command_that_a_page_shows_exists_and_takes_its_options() -> None:
     ("text", "wrong"),
     [
         ("set it with canbase adpot", ["adpot"]),
-        ("first canbase commission --steps directions,scale; then canbase doctor.", []),
-        ("first canbase commission --stages directions", ["commission takes no --stages"]),
-        ("`canbase sdo read 1 6041 --chanel can0`", ["sdo read takes no --chanel"]),
+        ("first canbase setup commission --steps directions,scale; then canbase doctor.", []),
+        ("first canbase setup commission --stages directions", ["commission takes no --stages"]),
+        ("`canbase bus sdo read 1 6041 --chanel can0`", ["sdo read takes no --chanel"]),
         ("canbase drive 1.0 --ros-args -p x:=1 --anything", []),
-        ("(canbase scan), or --this of another tool", []),
-        ("run canbase scan. --this begins another sentence", []),
+        ("(canbase bus scan), or --this of another tool", []),
+        ("run canbase bus scan. --this begins another sentence", []),
         ("see /etc/canbase and canbase.service", []),
     ],
 )

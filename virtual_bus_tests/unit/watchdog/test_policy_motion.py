@@ -262,13 +262,14 @@ def test_the_sentences_about_frames_have_the_values() -> None:
         "wheel_1_0 is enabled, and SYNCs come without setpoints for it: the last one is 0.100 s old (allowed 0.100 s)"
     )
     assert detail(replace(AT_REST, double_answers=10.0)) == (
-        "two drives answer as node 1, that of wheel_1_0: give each its own id (canbase scan names them). If there is "
+        "two drives answer as node 1, that of wheel_1_0: give each its own id (canbase bus scan names "
+        "them). If there is "
         "one alone, a gateway, a bridge or a second interface sends its frames again: take it out"
     )
     assert detail(replace(AT_REST, double_answers=10.0, copied_at=NOW)) == (
         "node 1, that of wheel_1_0, answers twice, with the same data within 2 ms: take out the gateway, the "
         "bridge or the second interface that sends its frames again. If there is none, two drives have this id "
-        "(canbase scan names them): give each its own"
+        "(canbase bus scan names them): give each its own"
     )
 
 
@@ -343,7 +344,7 @@ def test_frames_that_come_twice_trip_whatever_the_reason_and_the_likelier_one_co
     assert verdict.cause is TripCause.FOREIGN_MASTER
     assert verdict.detail.startswith(first)
     assert then in verdict.detail
-    assert "canbase scan" in verdict.detail or "candump" in verdict.detail
+    assert "canbase bus scan" in verdict.detail or "candump" in verdict.detail
     longest = decide(of(AT_REST, foreign=Sign(NOW, 0, "S" * 120, copied)), CONFIG, NOW)
     assert len(longest.detail.encode()) < 512, "the record of a trip keeps 512 bytes"
 

@@ -46,7 +46,7 @@ def test_what_the_page_does_reaches_the_process_and_its_end_is_told(monkeypatch:
     dialog = dialog_with(monkeypatch, 3)
 
     async def story() -> None:
-        run = asyncio.create_task(dialog.run("commission"))
+        run = asyncio.create_task(dialog.run("setup", "commission"))
         await until_asked(dialog)
         assert (dialog.runs, dialog.told[0][0]) == (True, "a warning before it begins")
         dialog.on_proof(dialog.proof(10.0), 10.0 + PROOF_S - 0.001)
@@ -63,7 +63,7 @@ def test_a_late_proof_a_second_one_and_one_that_was_never_asked_for_are_none(mon
     dialog = dialog_with(monkeypatch, 2)
 
     async def story() -> None:
-        run = asyncio.create_task(dialog.run("commission"))
+        run = asyncio.create_task(dialog.run("setup", "commission"))
         await until_asked(dialog)
         late = dialog.proof(10.0)
         dialog.on_proof(late, 10.0 + PROOF_S + 0.001)
@@ -80,7 +80,7 @@ def test_a_late_proof_a_second_one_and_one_that_was_never_asked_for_are_none(mon
 def test_a_failure_has_its_exit_code_and_the_next_run_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     dialog = dialog_with(monkeypatch, 0, code=1)
     for _ in range(2):
-        asyncio.run(dialog.run("commission"))
+        asyncio.run(dialog.run("setup", "commission"))
         assert (dialog.ended, len(dialog.told)) == ("ended with exit code 1", 3)
 
 
@@ -88,9 +88,9 @@ def test_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     dialog = dialog_with(monkeypatch, 1)
 
     async def story() -> None:
-        first = asyncio.create_task(dialog.run("commission"))
+        first = asyncio.create_task(dialog.run("setup", "commission"))
         await until_asked(dialog)
-        await dialog.run("init")
+        await dialog.run("setup", "init")
         assert dialog.runs
         dialog.stop()
         await first
@@ -111,7 +111,7 @@ def test_two_fingers_on_begin_start_one_process(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(asyncio, "create_subprocess_exec", counted)
 
     async def story() -> None:
-        both = asyncio.gather(dialog.run("commission"), dialog.run("commission"))
+        both = asyncio.gather(dialog.run("setup", "commission"), dialog.run("setup", "commission"))
         await until_asked(dialog)
         dialog.stop()
         await both
@@ -124,7 +124,7 @@ def test_a_stop_while_the_process_is_being_started_reaches_it(monkeypatch: pytes
     dialog = dialog_with(monkeypatch, 1, code=1)
 
     async def story() -> tuple[bool, str]:
-        run = asyncio.create_task(dialog.run("commission"))
+        run = asyncio.create_task(dialog.run("setup", "commission"))
         await asyncio.sleep(0)
         answer = await dialog.end()
         await run
@@ -147,7 +147,7 @@ def test_a_process_that_does_not_obey_is_no_stop(monkeypatch: pytest.MonkeyPatch
     dialog = CommissioningDialog()
 
     async def story() -> tuple[bool, str]:
-        run = asyncio.create_task(dialog.run("commission"))
+        run = asyncio.create_task(dialog.run("setup", "commission"))
         await asyncio.sleep(0)
         answer = await dialog.end()
         await run  # one that does not listen gets a signal
@@ -168,9 +168,9 @@ def test_without_a_process_nothing_is_said() -> None:
 
 def test_the_real_command_refuses_a_robot_yaml_that_is_not_there_in_words(tmp_path: Path) -> None:
     dialog = CommissioningDialog()
-    asyncio.run(dialog.run("commission", "--config", str(tmp_path / "none.yaml")))
+    asyncio.run(dialog.run("setup", "commission", "--config", str(tmp_path / "none.yaml")))
     assert dialog.ended == "ended with exit code 2"
-    assert any("canbase init writes one" in text and loud for text, loud in dialog.told)
+    assert any("canbase setup init writes one" in text and loud for text, loud in dialog.told)
 
 
 def test_a_line_without_an_end_ends_the_process_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,5 +178,5 @@ def test_a_line_without_an_end_ends_the_process_and_is_told(monkeypatch: pytest.
     monkeypatch.setattr(commissioning_dialog, "module_command", lambda *_: [sys.executable, "-c", script])
     dialog = CommissioningDialog()
     with pytest.raises(ValueError, match="limit"):
-        asyncio.run(dialog.run("commission"))
+        asyncio.run(dialog.run("setup", "commission"))
     assert (dialog.runs, dialog.ended) == (False, "ended with exit code -15")

@@ -27,5 +27,5 @@ def test_a_command_that_takes_too_long_is_killed(monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_real_command_says_what_is_wrong() -> None:
-    code, _, said = asyncio.run(own_command.run("sample", "none", patience_s=30.0))
+    code, _, said = asyncio.run(own_command.run("print", "sample", "none", patience_s=30.0))
     assert (code, "none" in said) == (2, True)

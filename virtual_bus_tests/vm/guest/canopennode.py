@@ -1,5 +1,5 @@
 """CANopenNode on a virtual interface: its gateway (CiA 309-3) is the master of the simulated drives, and its slave is
-adopted by `canbase adopt`.
+adopted by `canbase bus adopt`.
 
 The gateway reads, writes, is refused, gives node ids, enables the motors and drives; then its process is killed.
 docs/verification.md has what differed.
@@ -186,7 +186,7 @@ def _gives_node_ids(robot: Robot, commands: Gateway) -> None:
 
 
 def _is_adopted(robot: Robot) -> None:
-    """A slave without a node id gets one from `canbase adopt`, which then reports that it is no drive."""
+    """A slave without a node id gets one from `canbase bus adopt`, which then reports that it is no drive."""
     command = (*CANBASE, "adopt", "--interface", "socketcan", "--channel", BUS, "--yes")
     with background(DEVICE, PROGRAM, BUS, "-i", "0xFF"):
         robot.spin(1.0)

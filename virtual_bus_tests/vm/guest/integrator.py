@@ -30,7 +30,7 @@ NOT_HERE: Final = {"system/usb.txt"}
 """The guest has no lsusb."""
 MANIFEST: Final = Path("/etc/canbase/installed/robot.txt")
 KEPT: Final = {ROBOT_YAML, ROBOT_YAML.with_suffix(".env")}
-"""The owner's own files, which `canbase uninstall` leaves: docs/install.md."""
+"""The owner's own files, which `canbase setup uninstall` leaves: docs/install.md."""
 OPTIONS: Final = ("--hardware-watchdog", "5")
 """overlay.py installs with them."""
 
@@ -68,7 +68,7 @@ def journal(robot: Robot) -> Row:
 
 
 def support_bundle(robot: Robot) -> Row:
-    """`canbase support-bundle`: a recording of a trip is in it, and what `canbase doctor` reads of the interface."""
+    """`canbase record bundle`: a recording of a trip is in it, and what `canbase doctor` reads of the interface."""
     robot.make_ready()
     _trip(robot)
     robot.make_ready()
@@ -83,11 +83,12 @@ def support_bundle(robot: Robot) -> Row:
     _says(files["doctor.txt"], "bit rate", "500000 bit/s", "error active", "restart-ms 100, txqueuelen 64")
     _says(files["units/status.txt"], *(unit(part) for part in PARTS), "active (running)")
     _says(files["journal/canbase.json"], '"CANBASE_STATE": "ENABLED"')
-    return Row("canbase support-bundle", "after a trip", then=f"{len(files)} files; doctor reads can0")
+    return Row("canbase record bundle", "after a trip", then=f"{len(files)} files; doctor reads can0")
 
 
 def installed_again(robot: Robot) -> Row:
-    """`canbase install` with nothing new changes nothing; `canbase uninstall` leaves the owner's files alone."""
+    """`canbase setup install` with nothing new changes nothing; `canbase setup uninstall` leaves the owner's files
+    alone."""
     robot.make_ready()
     before = pids()
     for _ in range(2):
@@ -103,7 +104,9 @@ def installed_again(robot: Robot) -> Row:
     run(*CANBASE, "install", "--config", str(ROBOT_YAML), *OPTIONS)
     run("systemctl", "start", TARGET)
     robot.make_ready()
-    return Row("canbase install", "twice; uninstall; install", then="nothing changed; nothing left; drives enabled")
+    return Row(
+        "canbase setup install", "twice; uninstall; install", then="nothing changed; nothing left; drives enabled"
+    )
 
 
 def sandboxed() -> None:
@@ -134,12 +137,12 @@ def _uninstalled() -> None:
     files = {Path(line) for line in MANIFEST.read_text().splitlines()} | {MANIFEST}
     run(*CANBASE, "uninstall", "robot")
     if left := sorted(str(path) for path in files if path.exists() or path.is_symlink()):
-        raise BrokenPromiseError(f"canbase uninstall leaves {left}")
+        raise BrokenPromiseError(f"canbase setup uninstall leaves {left}")
     if gone := sorted(str(path) for path in KEPT if not path.exists()):
-        raise BrokenPromiseError(f"canbase uninstall takes the owner's {gone}")
+        raise BrokenPromiseError(f"canbase setup uninstall takes the owner's {gone}")
     listed = run("systemctl", "list-units", "--all", "--plain", "--no-legend", "canbase*@robot*").splitlines()
     if loaded := [line for line in listed if line.split()[1] != "not-found"]:
-        raise BrokenPromiseError(f"canbase uninstall leaves units: {loaded}")
+        raise BrokenPromiseError(f"canbase setup uninstall leaves units: {loaded}")
 
 
 def _entries(*match: str) -> list[Entry]:

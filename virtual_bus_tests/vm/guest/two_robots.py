@@ -94,7 +94,7 @@ def _is_gone(robot: Robot) -> None:
     robot.wait("its end", lambda: pids(NAME) == ["0"] * len(PARTS))
     left = [str(path) for path in Path("/etc").rglob(f"*{NAME}*")]
     if left:
-        raise BrokenPromiseError(f"canbase uninstall {NAME} --purge leaves {left}")
+        raise BrokenPromiseError(f"canbase setup uninstall {NAME} --purge leaves {left}")
     for part in PARTS:
         if show(unit(part), "ActiveState") != ["active"]:
             raise BrokenPromiseError(f"{unit(part)} ended with the other robot")

@@ -53,7 +53,9 @@ def upgraded(robot: Robot) -> Row:
     finally:
         robot.order(None)
         run("umount", "--lazy", str(NEXT), check=False)
-    return Row("canbase install", "an upgrade that needs a key more", then="refused at speed, unnoticed; done; undone")
+    return Row(
+        "canbase setup install", "an upgrade that needs a key more", then="refused at speed, unnoticed; done; undone"
+    )
 
 
 def _new_version() -> None:
@@ -73,13 +75,14 @@ def _new_version() -> None:
 def _is_refused(*more: str) -> None:
     words = (*NEW_CANBASE, "install", *OPTIONS, *more)
     done = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT_S, check=False)
-    wanted = (f"{KEY}: missing", "Nothing was changed", "canbase install --config COPY")
+    wanted = (f"{KEY}: missing", "Nothing was changed", "canbase setup install --config COPY")
     if done.returncode != 2 or not all(each in done.stderr for each in wanted):
         raise BrokenPromiseError(f"{words}: exit code {done.returncode}: {done.stderr}{done.stdout}")
 
 
 def _runs_by(robot: Robot, folder: Path) -> None:
-    """After the restart that `canbase install` asks for, every part is of this version, and the robot is ready."""
+    """After the restart that `canbase setup install` asks for, every part is of this version, and the robot is
+    ready."""
     run("systemctl", "restart", TARGET)
     robot.make_ready()
     for pid in pids():
