@@ -28,12 +28,11 @@ from canbase_config.robot import Robot
 from canbase_sim.plant.base import PlantParameters
 from drive_rig import Case, Rig
 from drive_ways import WAYS, Controller
+from figures import replace_section
 
 AFTER_S = 1.5
 """The base is watched for this long after the result [s]."""
 LIMIT_S = 200.0
-LEAST_MM = 0.01
-"""Lower values stand at the left edge of the picture: its axis is logarithmic."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,65 +111,35 @@ def table(results: dict[str, list[Measured]]) -> str:
     """As Markdown, in mm."""
     columns: dict[str, Callable[[Measured], float]] = {
         "error": lambda m: abs(m.error_m),
-        "overshoot": lambda m: m.overshoot_m,
         "moved after the result": lambda m: m.after_m,
-        "faster than allowed [mm/s]": lambda m: m.too_fast_mps,
     }
     head = [f"{name} {mark}" for name in columns for mark in ("p50", "p99", "max")]
-    lines = ["| | " + " | ".join(head) + " | median time [s] |", "|---" * (len(head) + 2) + "|"]
+    head += ["too fast, max [mm/s]", "median time [s]"]
+    lines = ["| [mm] | " + " | ".join(head) + " |", "|---" * (len(head) + 1) + "|"]
     for name, measured in results.items():
         cells = [
             f"{1000.0 * quantile([read(m) for m in measured], share):.1f}"
             for read in columns.values()
             for share in (0.5, 0.99, 1.0)
         ]
+        cells.append(f"{1000.0 * max(m.too_fast_mps for m in measured):.1f}")
         seconds = f"{quantile([m.duration_s for m in measured], 0.5):.1f}"
         lines.append(f"| {name} | " + " | ".join([*cells, seconds]) + " |")
     return "\n".join(lines)
-
-
-def plot(results: dict[str, list[Measured]], path: Path) -> None:
-    """Share of goals against the error, on a logarithmic axis. Needs matplotlib."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constrained")
-    reads = {
-        "|error| at standstill [mm]": lambda m: abs(m.error_m),
-        "distance driven after the result [mm]": lambda m: m.after_m,
-    }
-    for axis, (title, read) in zip(axes, reads.items(), strict=True):
-        for name, measured in results.items():
-            values = sorted(max(LEAST_MM, 1000.0 * read(m)) for m in measured)
-            axis.step(values, [100.0 * (i + 1) / len(values) for i in range(len(values))], label=name)
-        axis.axvline(3.0, color="grey", linestyle=":", label="budget: 3 mm")
-        axis.set(xscale="log", xlabel=f"{title}, {LEAST_MM} or less at the left edge")
-        axis.grid(alpha=0.3)
-    axes[0].set_ylabel("share of goals at or below this value [%]")
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=len(names))
-    count = len(next(iter(results.values())))
-    figure.suptitle(f"{count} random goals, half to double payload, measured on the wheel encoders")
-    figure.savefig(path, dpi=110)
 
 
 def main() -> int:
     """Exit code 0: canbase keeps its budget of 3 mm at p99."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--goals", type=int, default=500)
-    parser.add_argument("--write", type=Path, metavar="FOLDER", help="write accuracy.md and accuracy.png there")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="replace the section of odometry.md there")
     arguments = parser.parse_args()
     robot = load_robot(sample("bench")).robot
     chosen = cases(robot, arguments.goals)
     results = {name: [drive(robot, case, way) for case in chosen] for name, way in WAYS.items()}
     print(table(results))
     if arguments.write:
-        page = arguments.write / "accuracy.md"
-        _, heading, behaviors = page.read_text(encoding="utf-8").partition("\n## ")
-        page.write_text(report(results) + heading + behaviors, encoding="utf-8")  # behaviors.py writes that section
-        plot(results, arguments.write / "accuracy.png")
+        replace_section(arguments.write / "odometry.md", report(results))
     ours = results["canbase"]
     kept = all(quantile([abs(v) for v in values], 0.99) <= 0.003 for values in (
         [m.error_m for m in ours], [m.overshoot_m for m in ours]))  # fmt: skip
@@ -178,33 +147,21 @@ def main() -> int:
 
 
 def report(results: dict[str, list[Measured]]) -> str:
-    """The page docs/accuracy.md."""
+    """The section of docs/odometry.md."""
     count = len(next(iter(results.values())))
-    return f"""# Accuracy of DriveDistance
+    return f"""### drive_distance
 
-This page shows how exactly `drive_distance` stops at its goal, compared with three simpler methods.
-
-The benchmark drives {count} random goals in virtual time: 0.05 to 5 m, both directions, 0.05 to 0.5 m/s. The base has
-half to double its payload, dry and viscous friction, up to 3 % slip on either side, and drives of different stiffness.
-The driver runs at 50 or 100 Hz; odometry arrives at 20 to 50 Hz with jitter. Each method drives each goal once on the
-same base. `python benchmarks/accuracy.py --write docs` writes this page. Numbers are in mm, measured on the wheel
-encoders.
+{count} random goals in virtual time: 0.05 to 5 m, both directions, 0.05 to 0.5 m/s; half to double the payload,
+friction, up to 3 % slip on either side, and drives of different stiffness. The driver runs at 50 or 100 Hz; odometry
+arrives at 20 to 50 Hz with jitter. `python benchmarks/accuracy.py --write docs` writes this section.
 
 {table(results)}
 
-![Distribution of the errors and of the distance driven after the result, for each method](accuracy.png)
-
-- **canbase**: this repository. The result is sent after standstill, so nothing moves after it.
 - **lecture**: constant speed until the distance is reached, then one zero command, and the result at once.
-- **v² = 2as**: the stop profile of Nav2's DriveOnHeading with the limits of this robot, its default cycle (10 Hz) and
-  its default minimum speed (0.1 m/s), then one zero command, and the result at once. A second row runs it at canbase's
-  50 Hz. The profile is written after the published source; Nav2's own code does not run here.
-
-**Faster than allowed** is the measured speed above the goal's `max_speed_mps`, in mm/s. The command never exceeds that
-limit; the drive's velocity loop exceeds it for a moment at breakaway.
-
-These numbers contain no slip, because an encoder cannot measure it. With any controller, 3 % of slip over 1 m are 30 mm
-on the floor.
+- **v² = 2as**: the stop profile of Nav2's DriveOnHeading with the limits of this robot, at its default cycle (10 Hz)
+  and at canbase's 50 Hz, then one zero command, and the result at once.
+- **too fast**: the measured speed above the goal's `max_speed_mps`. The command never exceeds that limit; the drive's
+  velocity loop exceeds it for a moment at breakaway.
 """
 
 

@@ -1,6 +1,6 @@
 """How exactly do Nav2's behaviours stop, driven by canbase and by loops written after Nav2's own?
 
-    python benchmarks/behaviors.py [--goals 300] [--write docs/accuracy.md]
+    python benchmarks/behaviors.py [--goals 300] [--write docs]
 
 Every goal of DriveOnHeading and of Spin is driven once by each loop on the same base, with the same noise: the bases
 and the straight goals of accuracy.py. The loops of Nav2 are written after nav2_behaviors (branches jazzy and main),
@@ -27,13 +27,14 @@ from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from drive_rig import Case, Rig
 from drive_ways import Controller, Ours
+from figures import replace_section
 
 NAV2_PERIOD_S = 0.1
 """behavior_server's cycle_frequency is 10 Hz."""
 AFTER_S = 1.5
 """The base is watched for this long after the result [s]."""
 LIMIT_S = 200.0
-HEADING = "## Nav2's behaviours"
+HEADING = "### Nav2's behaviours"
 
 
 class ConstantSpeed:
@@ -169,24 +170,23 @@ def table(results: dict[str, list[Measured]], unit: float, name: str) -> str:
 
 
 def section(robot: Robot, count: int) -> str:
-    """The section of docs/accuracy.md."""
+    """The section of docs/odometry.md."""
     chosen = cases(robot, count)
     lines = {name: [straight(robot, case, way) for case in chosen] for name, way in STRAIGHT.items()}
     turned = [(replace(case, distance_m=1.0), angle) for case, angle in zip(chosen, angles(count), strict=True)]
     turns = {name: [turn(robot, case, angle, way) for case, angle in turned] for name, way in TURNS.items()}
     return f"""{HEADING}
 
-canbase serves Nav2's actions `drive_on_heading`, `backup` and `spin` ([actions.md](actions.md#nav2s-behaviours)). This
-table compares it with loops written after Nav2's published sources (branches jazzy and main), with their default
-parameters: 10 Hz, one zero command at the goal, and the result at once. {count} goals on the bases above; `backup` is
-`drive_on_heading` backward. `python benchmarks/behaviors.py --write docs/accuracy.md` writes this section.
+Loops written after Nav2's published sources (branches jazzy and main), with their default parameters: 10 Hz, one zero
+command at the goal, and the result at once. {count} goals on the bases above.
+`python benchmarks/behaviors.py --write docs` writes this section.
 
 {table(lines, 1000.0, "mm")}
 
 {table(turns, 1000.0, "mrad")}
 
-Nav2's own code does not run here. In its place the loops order the base directly; on a robot velocity_smoother and
-collision_monitor add their delay. With tf in place of odometry Nav2 sees the same pose, later.
+Nav2's own code does not run here. The loops command the base directly; on a robot velocity_smoother and
+collision_monitor add their delay.
 """
 
 
@@ -194,13 +194,12 @@ def main() -> int:
     """Exit code 0."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--goals", type=int, default=300)
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="replace the section in this page")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="replace the section of odometry.md there")
     arguments = parser.parse_args()
     text = section(load_robot(sample("bench")).robot, arguments.goals)
     print(text)
     if arguments.write:
-        page = arguments.write.read_text(encoding="utf-8")
-        arguments.write.write_text(page.partition(HEADING)[0].rstrip() + "\n\n" + text, encoding="utf-8")
+        replace_section(arguments.write / "odometry.md", text)
     return 0
 
 

@@ -23,13 +23,13 @@ from canbase_commissioning.umbmark.squares import closings
 from canbase_commissioning.umbmark.verdict import course_of, result, wheels_of
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
-from figures import quantile
+from figures import quantile, replace_section
 from support.room import BEAMS, NOISE_M, SimulatedBase, Truth, drawn_truth, drive_course, open_squares
 
 SIDE_M, SQUARES = 1.5, 4
 START = pose(0.0, 0.0, 0.3)
 MOUNT = pose(0.15, 0.0, 0.0)
-HEADING = "## How exact it is"
+HEADING = "### How exact it is"
 PICTURE = "calibration.png"
 LIMITS = {"wheel radius": 0.2, "track": 0.5}
 """Promised [%]."""
@@ -98,10 +98,10 @@ def section(measured: Sequence[Measured]) -> str:
     accepted = [one for one in measured if not one.refused]
     return f"""{HEADING}
 
-{len(measured)} simulated bases, each with a radius on each side and a track within ±3 % of robot.yaml, and with a
-scanner within 2 cm and 1° of its place in robot.yaml. Wheels slip at random by 3 mm after 1 m on each side (1 σ). The
-scanner has {BEAMS} beams and {1000 * NOISE_M:.0f} mm of noise (1 σ), in a room of 6 m × 6 m with furniture. Each base
-drives {SQUARES} squares of {SIDE_M} m in each direction. {refused} of the results were refused.
+{len(measured)} simulated bases, each with a radius on each side and a track within ±3 % of robot.yaml, slip of 3 mm
+after 1 m on each side (1 σ), and a scanner with {BEAMS} beams and {1000 * NOISE_M:.0f} mm of noise (1 σ), within 2 cm
+and 1° of its place in robot.yaml.
+Each base drives {SQUARES} squares of {SIDE_M} m in each direction. {refused} of the results were refused.
 
 {table(accepted)}
 
@@ -109,7 +109,6 @@ drives {SQUARES} squares of {SIDE_M} m in each direction. {refused} of the resul
 
 `PYTHONPATH=virtual_bus_tests python benchmarks/calibration.py --bases {len(measured)} --write docs` writes this
 section.
-
 """
 
 
@@ -154,15 +153,6 @@ def _squares(axes: Any, robot: Robot, believed: Wheels, true: Wheels, title: str
     axes.legend(fontsize=7)
 
 
-def write(folder: Path, text: str) -> None:
-    """Replaces the section of odometry.md in `folder`."""
-    page = folder / "odometry.md"
-    old = page.read_text(encoding="utf-8")
-    begin = old.index(HEADING)
-    end = old.index("\n## ", begin + 1) + 1
-    page.write_text(old[:begin] + text + old[end:], encoding="utf-8")
-
-
 def main() -> int:
     """Exit code 0; 1 where a result that was not refused is farther off than promised."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -176,7 +166,7 @@ def main() -> int:
     text = section(measured)
     print(text)
     if arguments.write:
-        write(arguments.write, text)
+        replace_section(arguments.write / "odometry.md", text)
         draw(robot, measured, arguments.write / "pictures" / PICTURE)
     far = [one for one in measured if not one.refused and not _kept(one)]
     print(f"{len(far)} of {len(measured)} farther off than promised")

@@ -1,10 +1,11 @@
-"""The result of a benchmark, and how a set of durations is reported. Used by all benchmarks but accuracy.py."""
+"""The result of a benchmark, and how a set of durations is reported. And sections of pages that benchmarks write."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 MS = 1000.0
 
@@ -47,3 +48,12 @@ def raise_priority(priority: int) -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError as error:
         print(f"no real-time priority: {error}")
+
+
+def replace_section(page: Path, text: str) -> None:
+    """`text` in place of the section of `page` with the same heading, its first line."""
+    before, heading, old = page.read_text(encoding="utf-8").partition(f"{text.splitlines()[0]}\n")
+    if not heading:
+        raise ValueError(f"{page} has no line {text.splitlines()[0]!r}: the section goes there")
+    after = min((old.find(mark) for mark in ("\n## ", "\n### ") if mark in old), default=len(old))
+    page.write_text(before + text + old[after:], encoding="utf-8")

@@ -174,7 +174,7 @@ def _scanner(scanner: Any, dropped: int) -> Check:
         found += f", {scanner.usable_share:.0%} of its beams are usable"
     if dropped or scanner.problem:
         found += f"; {dropped} scans dropped: {scanner.problem or 'some could not be used'}"
-    cure = "look at the scanner and its ROS driver; docs/safety_filter.md, Scanners, has what a scan must be"
+    cure = "look at the scanner and its ROS driver; docs/velocity.md, Scanners, has what a scan must be"
     if scanner.required and not scanner.fresh:
         return fail(name, found, cure)
     if dropped or scanner.problem:

@@ -59,7 +59,7 @@ ADVICE: Final[dict[Cause, str]] = {
     Cause.BUTTON_SILENT: "check the node that publishes estop_state and its network",
     Cause.SCANNER: "check the scanner's driver, its cable and its topic",
     Cause.OBSTACLE: "the safety filter did what it is for; check the scan if nothing was there",
-    Cause.FILTER: "docs/safety_filter.md explains this cause",
+    Cause.FILTER: "docs/velocity.md explains this cause",
     Cause.SOURCE_LOST: "check the node that drove: joystick, navigation or action server",
     Cause.STOP_REQUESTED: "somebody called motor_driver/stop; a reset ends it",
     Cause.SHUTDOWN: "the driver was asked to end",
