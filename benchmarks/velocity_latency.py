@@ -1,6 +1,6 @@
 """How long a command takes through mux and safety filter, and what they cost, beside a bare relay in the same run.
 
-    python benchmarks/velocity_latency.py          # about 40 s; prints the table of docs/performance.md
+    python benchmarks/velocity_latency.py          # about 40 s; prints a table
 
 Five sources at 50 Hz and a scan of 720 points at 20 Hz come from one process; `canbase serve velocity` runs as it
 does on a

@@ -50,7 +50,7 @@ def test_an_unknown_name_is_refused(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     with pytest.raises(SystemExit) as end:
         run.main()
     assert end.value.code == 2
-    assert "there is no benchmark reactoin; expected some of reaction," in capsys.readouterr().err
+    assert "there is no benchmark reactoin; expected some of latency," in capsys.readouterr().err
 
 
 def test_the_list_has_a_line_for_each_and_runs_none(
