@@ -2,7 +2,7 @@
 
 On a real cable two drives with one node id that answer at the same moment with the same bits look like one, and with
 different bits they destroy each other's frames, up to bus-off. So what such drives answer alike is read first, and the
-serial number only of nodes that have shown no second drive: docs/decisions/0100.
+serial number only of nodes that have shown no second drive: docs/decisions/0099.
 """
 
 from __future__ import annotations

@@ -114,7 +114,7 @@ def main() -> None:
     executor.add_node(Exercise(chosen.work, GROUPS[chosen.group](), chosen.slow_timer))
     try:
         while True:
-            executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() of rclpy 7.1 calls nothing (decision 2)
+            executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() of rclpy 7.1 calls nothing (decision 62)
     except KeyboardInterrupt:
         rclpy.shutdown()
 

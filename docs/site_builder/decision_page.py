@@ -7,7 +7,8 @@ from pathlib import Path
 _HEAD = """\
 # Decisions
 
-Why things are as they are: what was needed, what was decided, and what follows from it. One page for each decision.
+Why things are as they are: context, decision, consequence, and what was rejected. One page for each subject.
+A number that is missing here belongs to the record whose status names it.
 
 ```{{toctree}}
 :maxdepth: 1

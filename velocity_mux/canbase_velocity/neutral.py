@@ -12,7 +12,7 @@ Rules, for each source:
    last zero is old, and the operator may have moved the joystick since.
 6. A pause counts like 4 and 5 for whom only a zero arms: a lock held him back, or there was no usable scan for
    WITHOUT_SCANS_S. People walk up to a base that is at standstill. A program with `absent_s` goes on after a pause:
-   docs/decisions/0047.
+   docs/decisions/0029.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A pause counts like a stop for whom a person holds: a joystick that was held over it moves nothing before its zero.
 
-Pauses: a lock holds, or no scan has arrived for a second longer than its timeout. docs/decisions/0047.
+Pauses: a lock holds, or no scan has arrived for a second longer than its timeout. docs/decisions/0029.
 """
 
 from __future__ import annotations

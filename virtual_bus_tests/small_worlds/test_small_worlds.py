@@ -69,7 +69,7 @@ def test_a_second_layer_has_its_time_only_while_two_faults_hold_and_one_reaction
 
 
 def test_an_encoder_that_dies_as_the_emergency_stop_is_pressed_is_no_stand_and_the_next_order_finds_it() -> None:
-    """Loops of 20 Hz, 0.4 m/s: a drop to zero within a cycle is a possible one (docs/decisions/0058)."""
+    """Loops of 20 Hz, 0.4 m/s: a drop to zero within a cycle is a possible one (docs/decisions/0041)."""
     small = SmallWorld("driving")
     base, driver, watchdog = small.world.drives.bench.base, small.world.driver, small.world.watchdog
 

@@ -1,7 +1,7 @@
 """A ghost: the velocity shows that a wheel turns, one way, and its encoder does not move. Cause 12 in policy.py.
 
 Its drive works against a motion that does not exist, also with nothing ordered: the velocity loop integrates what
-606Ch shows, and the wheel accelerates behind an encoder that is frozen. The rule holds at two scales (decision 123):
+606Ch shows, and the wheel accelerates behind an encoder that is frozen. The rule holds at two scales (decision 41):
 
 | | the encoder moves | travel by 606Ch without that |
 |---|---|---|

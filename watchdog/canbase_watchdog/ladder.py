@@ -3,7 +3,7 @@
 Each node has a ladder of its own: a drive that brakes well is not made to coast because another one is lost.
 Quick stop and pre-operational leave the braking to the drive's velocity loop. Where that loop does not brake, or its
 sensor cannot be trusted, only the power can go: then the rungs between are left out. The last rung makes the drive
-restart; it is for a drive that reports itself that it kept its power, and for no other (docs/decisions/0044).
+restart; it is for a drive that reports itself that it kept its power, and for no other (docs/decisions/0023).
 """
 
 from __future__ import annotations

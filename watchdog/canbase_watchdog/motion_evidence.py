@@ -1,7 +1,7 @@
 """Whether a wheel shows the motion that it is ordered: the lower bounds of motion. It measures; policy.py decides.
 
 Rules, 1 and 5 for an enabled drive and the setpoint that a SYNC made effective, the others for one with power: a wheel
-that is being stopped can lose its sensor as well (docs/decisions/0020)
+that is being stopped can lose its sensor as well (docs/decisions/0041)
 1. Unseen: ordered to move, and the encoder has not moved: net, from one place to another, for an encoder that jitters
    moves nothing. The ordered travel adds up until it moves, however slow the order is; a setpoint of zero adds nothing
    and forgets nothing, so short orders add up too, and most of it outlives the power. The time adds up while an order

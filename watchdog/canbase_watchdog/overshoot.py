@@ -3,7 +3,7 @@
 The velocity loop of a drive integrates what it lacks, and the integral comes back to where it was when the wheel has
 caught up the way that it lost; that is so with any bandwidth, load and force. How fast it does so depends on them:
 a critically damped loop that was held for 0.2 s reaches up to three times what it lacked above its setpoint; a faster
-loop goes higher, for less than five samples (docs/decisions/0046).
+loop goes higher, for less than five samples (docs/decisions/0041).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The wheel follows its setpoints: it may have the speed of any setpoint of the la
 that it falls with the configured deceleration, under "brakes hard" with the emergency deceleration. What it must have
 at least is motion_evidence.py. A wheel that something held back catches up when it comes free (overshoot.py). Encoder
 and velocity show the same travel, but for a small drift: a difference is forgotten over the way on which it did not
-grow, and very slowly with time, so that it is found at any speed (docs/decisions/0020).
+grow, and very slowly with time, so that it is found at any speed (docs/decisions/0041).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The distance that a wheel needs to stop: from a speed v at least v² / 2a, braked by a (docs/decisions/0042).
+"""The distance that a wheel needs to stop: from a speed v at least v² / 2a, braked by a (docs/decisions/0041).
 
 A sensor that shows a speed, and then a standstill within less, did not show how the wheel stopped: it met something
 hard, or the sensor is dead. Only distance counts and no time, as frames may be lost and 606Ch may be filtered. The

@@ -6,7 +6,7 @@ the slowest ramp get there, one of them after the other. Drives with slow ramps 
 to fast straight on, both wheels are on their ramps, and the base turns until the first one is there. So what wheels on
 the slowest ramp do with these setpoints is allowed as if it were ordered. Speeds are smoothed, as the noise of two
 wheels adds up. The time outside adds up to `twist_s`, and goes down as fast while the base is inside
-(docs/decisions/0020).
+(docs/decisions/0041).
 """
 
 from __future__ import annotations

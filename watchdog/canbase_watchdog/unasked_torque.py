@@ -1,4 +1,4 @@
-"""Torque that changes with nothing ordered, while the encoder does not count (docs/decisions/0123). Pure, one wheel.
+"""Torque that changes with nothing ordered, while the encoder does not count (docs/decisions/0041). Pure, one wheel.
 
 A drive changes the torque that holds a wheel because it saw the wheel move. One whose encoder did not count works
 against a motion that does not exist: its velocity loop integrates an error that 606Ch need not even show. It must

@@ -6,7 +6,7 @@ ordered of all wheels, and gets it back at once: its loop starts again. A wheel 
 and is held again; one that friction holds does not notice (docs/decisions/0041).
 
 The same holds where the torque changes later, with nothing ordered, and the encoder does not count: the drive works
-against a motion that does not exist (docs/decisions/0123). Where the release does not end that, the watchdog trips.
+against a motion that does not exist (docs/decisions/0041). Where the release does not end that, the watchdog trips.
 
     HELD ──an axis must (axis.py)──► LETTING GO ──no axis has torque──► RETURNING ──all enabled──► HELD
 """

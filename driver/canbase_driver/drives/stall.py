@@ -1,6 +1,6 @@
 """Whether a drive stalls: much torque, no speed, though motion is ordered. It measures; `hazards.py` decides. Pure.
 
-Rules, for each sample of a wheel (docs/decisions/0066)
+Rules, for each sample of a wheel (docs/decisions/0041)
 1. It adds to the time if the torque is at least health.stall_torque_share of the rated one, the wheel is slower than
    base.standstill_mps, and the drive is enabled and ordered at least ORDERED times that speed. Any other sample takes
    its time off again: one bad sample in ten hides nothing.

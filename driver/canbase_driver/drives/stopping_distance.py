@@ -2,7 +2,7 @@
 
 The distance is that of the encoder, net from where the speed was shown: an encoder counts over gaps and lost frames,
 and no time is in it, so frames that come late or a velocity that is filtered change nothing. An encoder that dies shows
-no distance: what it showed last is not braked away, and its standstill proves nothing (docs/decisions/0042). Pure.
+no distance: what it showed last is not braked away, and its standstill proves nothing (docs/decisions/0041). Pure.
 """
 
 from __future__ import annotations

@@ -114,7 +114,7 @@ def test_an_encoder_that_is_lost_at_the_end_of_a_stop_is_no_stand(speed: float, 
 
 @pytest.mark.parametrize("speed", [0.1, 0.15, 0.2, 0.25])
 def test_an_encoder_that_is_lost_as_the_order_ends_is_no_stand_for_as_long_as_the_wheel_rolls(speed: float) -> None:
-    """The emergency stop, at 2 m/s²: the order is gone before any rule has its time (docs/decisions/0058)."""
+    """The emergency stop, at 2 m/s²: the order is gone before any rule has its time (docs/decisions/0041)."""
     world = World()
     world.drive(Twist2D(speed, 0.0), 1.5)
     lose(world)

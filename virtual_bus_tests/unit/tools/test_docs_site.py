@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,7 @@ from site_builder import (
 from site_builder.docstrings import converted
 from site_builder.modules import ROOT, Module, modules, purpose, shipped_packages
 
+RECORDS = {int(record.name[:4]): record for record in sorted((ROOT / "docs" / "decisions").glob("*.md"))}
 ALL = [module for package in shipped_packages() for module in modules(package)]
 
 
@@ -94,7 +97,40 @@ def test_the_page_of_messages_has_every_definition_and_its_comments() -> None:
 def test_the_page_of_decisions_has_every_record() -> None:
     page = decision_page.page(ROOT)
 
-    assert all(f"/decisions/{record.stem}\n" in page for record in (ROOT / "docs" / "decisions").glob("*.md"))
+    assert all(f"/decisions/{record.stem}\n" in page for record in RECORDS.values())
+
+
+def texts() -> Iterator[tuple[Path, str]]:
+    """Sources, pages and catalogues of the repository, without what is built."""
+    for top in ROOT.iterdir():
+        if top.name.startswith(".") or top.name == "build":
+            continue
+        for path in top.rglob("*") if top.is_dir() else [top]:
+            if path.suffix in {".py", ".md", ".yaml", ".txt", ".toml", ".msg", ".action"} and path.is_file():
+                yield path, path.read_text(encoding="utf-8")
+
+
+def test_every_reference_to_a_decision_leads_to_its_record() -> None:
+    records = {number: record.stem for number, record in RECORDS.items()}
+    for path, text in texts():
+        for number, slug in re.findall(r"decisions/(\d{4})(-[a-z0-9-]*[a-z0-9])?", text):
+            assert records.get(int(number), "").startswith(f"{number}{slug}"), f"{path}: decisions/{number}{slug}"
+        for number in re.findall(r"[Dd]ecision (\d+)", text):
+            assert int(number) in records, f"{path}: decision {number}"
+
+
+def test_a_record_has_its_parts_and_each_former_number_is_in_one() -> None:
+    former: list[int] = []
+    for number, record in RECORDS.items():
+        text = record.read_text(encoding="utf-8")
+        assert text.startswith(f"# {number}. ")
+        assert all(part in text for part in ("**Status.** ", "Context", "Decision")), record.name
+        status = text.split("**Status.** ")[1].split("\n\n")[0]
+        names = re.search(r"former records? ([^;]*)", status)
+        former += map(int, re.findall(r"\b\d{1,3}\b", re.sub(r"\([^)]*\)", "", names[1]))) if names else []
+
+    assert len(former) == len(set(former))
+    assert not set(former) & set(RECORDS)
 
 
 @pytest.mark.parametrize(
