@@ -1,7 +1,7 @@
 """From power on to Operation Enabled on a bus with a bit rate, in virtual time: two drives of each kind, and eight.
 
 Counted are the drives' own delays and the time that each frame takes on the bus; Python's own time is not (`startup.py`
-measures that). `python benchmarks/boot.py` prints the table of docs/drives.md.
+measures that). `python benchmarks/boot.py` prints the table.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The steps of a goal that the action server logs, and that `canbase doctor` reads: field `step` of docs/logs.md."""
+"""The logged steps of a goal, `CANBASE_STEP` of docs/troubleshooting.md; `canbase doctor` reads them."""
 
 from __future__ import annotations
 

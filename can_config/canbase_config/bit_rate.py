@@ -1,7 +1,7 @@
 """The bit rates of CANopen (CiA 301), and one cable at several of them.
 
 A simulated bus has no bit rate. So there is one channel for each: what is sent on it can be read at its rate alone. The
-channel of robot.yaml is that of `bus.bitrate`; docs/from_the_box.md describes the others.
+channel of robot.yaml is that of `bus.bitrate`; docs/drive_types.md describes the others.
 """
 
 from __future__ import annotations

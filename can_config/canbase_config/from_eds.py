@@ -85,7 +85,7 @@ def draft(eds: Eds) -> Draft:
     if eds.has(0x6079):
         out.section("measures")
         out.lines.append("  voltage: {index: 0x6079, bits: 32, scale: 0.001}   # has 6079h; CiA 402-2: mV")
-    head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: a draft, not proven. See docs/drives.md.\n\n"
+    head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: not proven. See docs/drive_types.md.\n\n"
     tail = ["unproven:", *(f"  - {path}" for path in out.unproven)]
     return Draft(head + "\n".join(out.lines + tail) + "\n", missing, self_stop_sentence(eds), UNKNOWN_TO_ANY_EDS)
 

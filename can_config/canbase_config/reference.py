@@ -31,7 +31,7 @@ _PROFILE_HEAD: Final = """\
 # Drive profiles
 
 A `.yaml` file for a kind of drive, named by `drives[…].profile` of robot.yaml. A key that is left out has the value of
-the `generic` profile. How to write one: [drives.md](drives.md).
+the `generic` profile. How to write one: [drive_types.md](drive_types.md#a-new-drive-in-five-steps).
 """
 _ROW: Final = "| {} | {} | {} | {} |"
 

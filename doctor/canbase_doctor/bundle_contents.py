@@ -23,8 +23,8 @@ FORBIDDEN: Final = re.compile(
 BOXES: Final = 5
 """The number of recordings of stops, the newest first."""
 LEGEND: Final = (
-    "Each file holds only what docs/logs.md lists. An ellipsis stands for what was left out: a word that is none of "
-    "canbase's own messages. Zeros stand for the data of SDO frames that can hold text.\n"
+    "Each file holds only what docs/troubleshooting.md lists. An ellipsis stands for what was left out: a word that is "
+    "none of canbase's own messages. Zeros stand for the data of SDO frames that can hold text.\n"
 )
 
 

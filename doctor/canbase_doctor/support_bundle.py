@@ -284,8 +284,8 @@ def support_bundle(
 ) -> None:
     """Collect data for remote help: configuration, versions, units, journal, CAN statistics, black box.
 
-    It changes nothing and reads no keys (docs/logs.md). As root it can read more. A robot.yaml with mistakes is
-    included with a list of them.
+    It changes nothing and reads no keys (docs/troubleshooting.md). As root it can read more. A robot.yaml with mistakes
+    is included with a list of them.
 
     Exit codes: 0 written, 1 not written.
     """

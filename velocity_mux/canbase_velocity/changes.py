@@ -1,4 +1,4 @@
-"""The log entries of mux and filter for each changed decision: sentence, severity and fields (docs/logs.md)."""
+"""The log entries of mux and filter for each changed decision: sentence, severity, fields (docs/troubleshooting.md)."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ what its profile calls unproven, with the comment beside it.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Final
@@ -51,12 +51,11 @@ NMT = {
     NmtCommand.RESET_NODE: "reset node",
     NmtCommand.ENTER_PRE_OPERATIONAL: "enter pre-operational",
 }
-HOW_TO_READ: Final = (
-    "In this order, in a boot of the simulated drive ([how to read it](../drives.md#a-page-for-each-kind)):"
-)
+HOW_TO_READ: Final = "In this order ([how to read it](../drive_types.md#how-to-read-the-page-of-a-drive-type)):"
 MILLISECONDS = (0x1017, 0x100C, 0x2000)
 RAMPS = (0x6083, 0x6084, 0x6085)
 PDO_OFF = 1 << 31
+OFF = " | off"
 
 
 def page(kind: str, before: str) -> str:
@@ -68,10 +67,19 @@ def page(kind: str, before: str) -> str:
 
 def boot_section(record: BootRecord) -> str:
     """What the boot wrote, a row for each object, one for each PDO; and what it notes."""
-    rows = "\n".join(f"| {cells} |" for cells in _boot_rows(record))
+    rows = "\n".join(f"| {cells} |" for cells in _joined(_boot_rows(record)))
     notes = "".join(f"\n- {note}" for note in record.report.notes)
     told = f"Notes of this boot, in /diagnostics:\n{notes}" if notes else "This boot has no notes."
     return f"{HOW_TO_READ}\n\n| object | set to |\n|---|---|\n{rows}\n\n{told}"
+
+
+def _joined(rows: Iterable[str]) -> Iterator[str]:
+    """PDOs that are switched off one after the other are one row."""
+    for is_off, group in groupby(rows, key=lambda row: row.endswith(OFF)):
+        if is_off:
+            yield ", ".join(row.removesuffix(OFF) for row in group) + OFF
+        else:
+            yield from group
 
 
 def _boot_rows(record: BootRecord) -> Iterator[str]:
@@ -102,7 +110,7 @@ def _pdo_row(name: str, steps: Sequence[Written]) -> str:
     carried = {step.sub: step.value for step in steps if step.index >= communication + 0x200 and step.sub}
     index = communication + int(name[4:]) - 1
     if settings[1] & PDO_OFF:
-        return f"{name} ({index:04X}h) | off"
+        return f"{name} ({index:04X}h){OFF}"
     what = f"on, COB-ID {settings[1] & 0x7FF:03X}h"
     what += f"; carries {', '.join(map(_mapped, carried.values()))}" if carried else ""
     what += f"; type {settings[2]}" if 2 in settings else ""

@@ -31,6 +31,11 @@ MAPS = tuple(name for name in CLASSES if name not in ("takes no such value", "do
 CHANNEL = tuple(name for name in CLASSES if name not in ("does not exist", "cannot be mapped", "has another width"))
 READS = ("does not exist", "general error")
 BEGIN, END = "<!-- make refusals: begin -->", "<!-- make refusals: end -->"
+WRONG_STATE = (
+    "The state of the drive forbids it, and the boot is tried again each second. If this goes on, switch the drive off "
+    "and on again, and let no other master control it."
+)
+"""Ends the message where an object is refused in this state, whatever the object: above the table, not in its rows."""
 COLUMNS = "| object | the drive's answer | the boot |\n|---|---|---|\n"
 
 
@@ -92,6 +97,7 @@ def rows() -> Iterator[str]:
     """Ways of one object that lead to the same sentence are one row."""
     for refusal in REFUSALS:
         told = [(way, outcome(refusal, CLASSES[way])) for way in refusal.ways]
+        told = [(way, sentence) for way, sentence in told if not sentence.endswith(WRONG_STATE)]
         for sentence, ways in groupby(sorted(told, key=lambda each: each[1]), key=lambda each: each[1]):
             name = f"{refusal.key[0]:04X}h:{refusal.key[1]} {refusal.what}"
             yield " | ".join((name, ", ".join(way for way, _ in ways), sentence))

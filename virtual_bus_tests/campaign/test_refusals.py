@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from campaign.refusals import CLASSES, PAGE, REFUSALS, outcome, page
+from campaign.refusals import CLASSES, PAGE, REFUSALS, WRONG_STATE, outcome, page
 from canbase_campaign.advice import read_advice
 
 STEPS = re.compile(r"maker's tool|switch the drive off and on|check `axis`|`mode`|the manual of the drive")
@@ -13,6 +13,13 @@ STEPS = re.compile(r"maker's tool|switch the drive off and on|check `axis`|`mode
 def test_the_page_is_up_to_date() -> None:
     before = PAGE.read_text(encoding="utf-8")
     assert page(before) == before, "make refusals"
+    assert WRONG_STATE in " ".join(before.split())
+
+
+def test_what_the_page_says_once_is_said_of_every_required_object() -> None:
+    """The rows leave out a refusal that ends so; no other one does."""
+    ends = {way for refusal in REFUSALS for way in refusal.ways if outcome(refusal, CLASSES[way]).endswith(WRONG_STATE)}
+    assert ends == {"not in this state"}
 
 
 def test_every_error_names_an_object_and_a_next_step() -> None:

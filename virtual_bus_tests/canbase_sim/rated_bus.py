@@ -1,4 +1,4 @@
-"""A python-can bus for each bit rate of one cable, for simulated drives whose rate may change: docs/from_the_box.md."""
+"""A python-can bus for each bit rate of one cable, for simulated drives whose rate may change: docs/drive_types.md."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ NO_REQUESTS = (
 
 OFF_BEFORE = (
     "the CAN controller was bus-off before this start: check cable, termination and bit rate, and set restart-ms of "
-    "the interface (docs/install.md). No drive gets power, and the relay stays open, until a frame comes"
+    "the interface (docs/wiring.md). No drive gets power, and the relay stays open, until a frame comes"
 )
 
 _log = logging.getLogger("canbase.watchdog")

@@ -44,7 +44,7 @@ PROFILE_KEYS: tuple[tuple[range, str], ...] = (
     (range(0x60C2, 0x60C3), "options.interpolation"),
     (range(0x60FF, 0x6100), "layout.target_bits"),
 )
-"""Object → the key of a drive profile (docs/drives.md) for whether, where or how wide the drive has it."""
+"""Object → the key of a drive profile (docs/configuration.md) for whether, where or how wide the drive has it."""
 LACKS = {
     "self_stop.heartbeat_entries": "0",
     "self_stop.node_guarding": "false",

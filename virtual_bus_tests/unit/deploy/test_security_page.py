@@ -25,7 +25,7 @@ def test_the_table_has_every_enclave_of_the_policy_and_no_other() -> None:
 def test_the_list_of_what_listens_has_the_port_of_each_server() -> None:
     listens = PAGE.partition("## What listens")[2].partition("\n## ")[0]
     ports = {name: inspect.signature(command).parameters["port"].default for name, command in
-             (("canbase web", web), ("canbase metrics", metrics))}  # fmt: skip
+             (("canbase web", web), ("canbase serve metrics", metrics))}  # fmt: skip
 
     for name, port in ports.items():
         (row,) = [line for line in listens.splitlines() if line.startswith("|") and f"`{name}`" in line]

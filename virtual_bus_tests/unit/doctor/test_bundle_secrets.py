@@ -190,7 +190,7 @@ def test_no_secret_that_was_planted_is_in_the_archive(archive: Mapping[str, str]
 
 
 def test_what_helps_is_still_in_it(archive: Mapping[str, str]) -> None:
-    """What docs/logs.md promises."""
+    """What docs/troubleshooting.md promises."""
     assert "counts_per_motor_rev: 4096" in archive["config/robot.yaml"]
     assert "joint: left_wheel" in archive["config/robot.yaml"]
     assert "unknown key" in archive["config/problems.txt"]

@@ -1,4 +1,4 @@
-"""What any simulated drive can be made to do wrong, as a master sees it. docs/drives.md lists these switches."""
+"""What any simulated drive can be made to do wrong, as a master sees it. docs/drive_types.md lists these switches."""
 
 from __future__ import annotations
 
@@ -157,5 +157,5 @@ def test_a_sync_counter_is_expected_where_1019h_says_so(rig: Rig) -> None:
 
 @pytest.mark.parametrize("name", sorted({*KINDS, *PERSONALITIES}))
 def test_every_fault_and_every_kind_is_in_the_documentation(name: str) -> None:
-    page = Path(__file__).parents[3] / "docs" / "drives.md"
+    page = Path(__file__).parents[3] / "docs" / "drive_types.md"
     assert f"`{name}`" in page.read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ from support.marked_page import section
 HEADINGS = (
     "Wiring",
     "As delivered",
-    "Settings in the maker's tool",
+    "Settings in the vendor's tool",
     "What the boot sets",
     "What stops it",
     "What is proven, and where",

@@ -30,7 +30,7 @@ NOT_HERE: Final = {"system/usb.txt"}
 """The guest has no lsusb."""
 MANIFEST: Final = Path("/etc/canbase/installed/robot.txt")
 KEPT: Final = {ROBOT_YAML, ROBOT_YAML.with_suffix(".env")}
-"""The owner's own files, which `canbase setup uninstall` leaves: docs/install.md."""
+"""The owner's own files, which `canbase setup uninstall` leaves: docs/services.md."""
 OPTIONS: Final = ("--hardware-watchdog", "5")
 """overlay.py installs with them."""
 
@@ -51,7 +51,7 @@ Entry = dict[str, Any]
 
 
 def journal(robot: Robot) -> Row:
-    """A goal that is driven, then a trip: what docs/logs.md says of their entries."""
+    """A goal that is driven, then a trip: what docs/troubleshooting.md says of their entries."""
     robot.make_ready()
     robot.goal(0.05).wait(20.0)
     _trip(robot)
