@@ -52,7 +52,7 @@ LOOP_LATE_S: Final = 0.5
 """`timeouts` and `watchdog.loop_late_s` of the demo: it shows the chain, and a laptop that is busy may not trip it. A
 robot keeps its defaults."""
 
-NEXT: Final = """Next: `canbase up` starts a robot that keeps running.
+NEXT: Final = """Next: `canbase up --bench` starts a robot that keeps running.
 In another terminal: `canbase drive 1.0`, `canbase monitor`, `canbase web`. First steps: docs/start.md"""
 
 
@@ -296,7 +296,7 @@ def _domain() -> Iterator[int]:
 
 
 def _robot_file(folder: Path) -> Path:
-    """The bench sample on a free port, with a lease socket of its own and patient timeouts."""
+    """The sample of the bench on a free port, with a lease socket of its own and patient timeouts."""
     from ruamel.yaml import YAML
 
     from canbase_config.load import sample

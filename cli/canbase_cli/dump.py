@@ -40,7 +40,7 @@ def dump(
 ) -> None:
     """Show each frame on the bus in words, until Ctrl-C. It sends nothing.
 
-    Without --config and --channel it listens to the bus of the bench sample. PDO mappings come from robot.yaml, or from
+    Without --config and --channel it listens to the bus of the robot here. PDO mappings come from robot.yaml, or from
     the SDO transfers that are seen; an assumed mapping is marked. `canbase explain` reads recordings.
 
     Exit codes: 0 ended by Ctrl-C or by its reader, 1 the bus failed, 2 wrong command line or robot.yaml.

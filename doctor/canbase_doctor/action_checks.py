@@ -41,7 +41,7 @@ def server_process(seen: Evidence) -> Check:
     if any(action.endswith(f"/{ACTION}") for action in seen.servers):
         return ok(name, "runs on another computer, or as another user")
     return fail(
-        name, "none runs on this computer, and none is seen", "canbase up, or canbase action-server; see its log"
+        name, "none runs on this computer, and none is seen", "canbase up, or canbase serve action-server; see its log"
     )
 
 

@@ -113,7 +113,7 @@ def canopennode(robot: Robot) -> Row:
 
 @contextmanager
 def _drives(robot: Robot) -> Iterator[SimControl]:
-    command = (*CANBASE, "sim", "--config", str(CONFIG), "--control", str(CONTROL))
+    command = (*CANBASE, "serve", "sim", "--config", str(CONFIG), "--control", str(CONTROL))
     with background(DRIVES, *command):
         robot.wait("the simulated drives", CONTROL.exists)
         with SimControl(CONTROL, timeout_s=ANSWER_S) as drives:
@@ -187,7 +187,7 @@ def _gives_node_ids(robot: Robot, commands: Gateway) -> None:
 
 def _is_adopted(robot: Robot) -> None:
     """A slave without a node id gets one from `canbase bus adopt`, which then reports that it is no drive."""
-    command = (*CANBASE, "adopt", "--interface", "socketcan", "--channel", BUS, "--yes")
+    command = (*CANBASE, "bus", "adopt", "--interface", "socketcan", "--channel", BUS, "--yes")
     with background(DEVICE, PROGRAM, BUS, "-i", "0xFF"):
         robot.spin(1.0)
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)

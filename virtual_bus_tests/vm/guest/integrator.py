@@ -72,7 +72,7 @@ def support_bundle(robot: Robot) -> Row:
     robot.make_ready()
     _trip(robot)
     robot.make_ready()
-    run(*CANBASE, "support-bundle", "--config", str(ROBOT_YAML), "--output", str(BUNDLE))
+    run(*CANBASE, "record", "bundle", "--config", str(ROBOT_YAML), "--output", str(BUNDLE))
     with tarfile.open(BUNDLE) as archive:
         files = {name.partition("/")[2]: _text(archive, name) for name in archive.getnames()}
     not_collected, _, _ = files["MANIFEST.txt"].partition("\nCOLLECTED\n")
@@ -92,7 +92,7 @@ def installed_again(robot: Robot) -> Row:
     robot.make_ready()
     before = pids()
     for _ in range(2):
-        told = run(*CANBASE, "install", "--config", str(ROBOT_YAML), *OPTIONS)
+        told = run(*CANBASE, "setup", "install", "--config", str(ROBOT_YAML), *OPTIONS)
         changed = [line for line in told.splitlines() if line.split()[0] in ("wrote", "replaced", "linked", "removed")]
         if changed:
             raise BrokenPromiseError(f"installed a second time it changes: {changed}")
@@ -101,7 +101,7 @@ def installed_again(robot: Robot) -> Row:
         raise BrokenPromiseError(f"the robot noticed a second installation: {robot.told()}")
     sandboxed()
     _uninstalled()
-    run(*CANBASE, "install", "--config", str(ROBOT_YAML), *OPTIONS)
+    run(*CANBASE, "setup", "install", "--config", str(ROBOT_YAML), *OPTIONS)
     run("systemctl", "start", TARGET)
     robot.make_ready()
     return Row(
@@ -135,7 +135,7 @@ def _trip(robot: Robot) -> None:
 
 def _uninstalled() -> None:
     files = {Path(line) for line in MANIFEST.read_text().splitlines()} | {MANIFEST}
-    run(*CANBASE, "uninstall", "robot")
+    run(*CANBASE, "setup", "uninstall", "robot")
     if left := sorted(str(path) for path in files if path.exists() or path.is_symlink()):
         raise BrokenPromiseError(f"canbase setup uninstall leaves {left}")
     if gone := sorted(str(path) for path in KEPT if not path.exists()):

@@ -120,12 +120,12 @@ def _slave(node_id: int) -> str:
 
 @contextmanager
 def _installed() -> Iterator[None]:
-    run(*CANBASE, "install", "--config", str(CONFIG), "--no-can", "--namespace", NAME)
+    run(*CANBASE, "setup", "install", "--config", str(CONFIG), "--no-can", "--namespace", NAME)
     try:
         run("systemctl", "start", f"canbase@{NAME}.target")
         yield
     finally:
-        run(*CANBASE, "uninstall", NAME, "--purge")
+        run(*CANBASE, "setup", "uninstall", NAME, "--purge")
 
 
 def _speeds(config: Config) -> Iterator[float]:

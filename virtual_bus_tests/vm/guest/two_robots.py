@@ -49,7 +49,7 @@ def two_robots(robot: Robot) -> Row:
         second.make_ready()
         second.drive()
         _say("the second drives again")
-        run(*CANBASE, "uninstall", NAME, "--purge")
+        run(*CANBASE, "setup", "uninstall", NAME, "--purge")
         _say("the second is uninstalled")
         _drive_on(robot)
         _is_gone(robot)
@@ -70,9 +70,9 @@ def _second_is_installed() -> None:
     run("ip", "link", "set", BUS, "up")
     fifo = ("-p", "CPUSchedulingPolicy=fifo", "-p", "CPUSchedulingPriority=60")
     environment = ("--setenv=_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", "--setenv=PYTHONUNBUFFERED=1")
-    sim = (*CANBASE, "sim", "--config", str(CONFIG), "--control", CONTROL)
+    sim = (*CANBASE, "serve", "sim", "--config", str(CONFIG), "--control", CONTROL)
     run("systemd-run", f"--unit={DRIVES}", *fifo, *environment, *sim)
-    run(*CANBASE, "install", "--config", str(CONFIG), "--no-can", "--namespace", NAME)
+    run(*CANBASE, "setup", "install", "--config", str(CONFIG), "--no-can", "--namespace", NAME)
     run("systemctl", "start", f"canbase@{NAME}.target")
 
 

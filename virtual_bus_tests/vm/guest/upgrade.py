@@ -40,13 +40,13 @@ def upgraded(robot: Robot) -> Row:
             raise BrokenPromiseError(f"the robot noticed the refused upgrade: {robot.told()}")
         robot.order(None)
         NEW_YAML.write_text(f"{text}{KEY}: 30.0\n")
-        run(*NEW_CANBASE, "install", "--config", str(NEW_YAML), "--network", "lan", *OPTIONS)
+        run(*NEW_CANBASE, "setup", "install", "--config", str(NEW_YAML), "--network", "lan", *OPTIONS)
         if pids() != before:
             raise BrokenPromiseError("an installation has started a part again")
         _runs_by(robot, NEXT)
         if ONLINE not in show(unit("driver"), "After")[0] or ONLINE in show(unit("watchdog"), "After")[0]:
             raise BrokenPromiseError(f"with --network lan the driver, and it alone, waits for {ONLINE}")
-        run(*CANBASE, "install", "--config", str(OLD_YAML), *OPTIONS)
+        run(*CANBASE, "setup", "install", "--config", str(OLD_YAML), *OPTIONS)
         _runs_by(robot, Path("/opt/canbase"))
         if ONLINE in show(unit("driver"), "After")[0] or ROBOT_YAML.read_text() != text:
             raise BrokenPromiseError("the way back does not lead back")
@@ -73,7 +73,7 @@ def _new_version() -> None:
 
 
 def _is_refused(*more: str) -> None:
-    words = (*NEW_CANBASE, "install", *OPTIONS, *more)
+    words = (*NEW_CANBASE, "setup", "install", *OPTIONS, *more)
     done = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT_S, check=False)
     wanted = (f"{KEY}: missing", "Nothing was changed", "canbase setup install --config COPY")
     if done.returncode != 2 or not all(each in done.stderr for each in wanted):
