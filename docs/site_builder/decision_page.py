@@ -8,7 +8,7 @@ _HEAD = """\
 # Decisions
 
 Why things are as they are: context, decision, consequence, and what was rejected. One page for each subject.
-A number that is missing here belongs to the record whose status names it.
+A new choice changes the record of its subject. A missing number belongs to the record whose status names it.
 
 ```{{toctree}}
 :maxdepth: 1
