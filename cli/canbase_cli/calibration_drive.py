@@ -1,5 +1,4 @@
-"""The ROS side of `canbase setup calibrate`: drives the squares by the ordinary actions, and records wheels and
-scans."""
+"""The ROS side of `canbase setup calibrate`: drives the squares by the actions, and records wheels and scans."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""`canbase prove evidence`: what is known about the stops of a robot, in one folder; and whether that folder was
-changed."""
+"""`canbase prove evidence`: what is known about the stops of a robot, in one folder that shows later changes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""`canbase setup install` and `canbase setup uninstall`: a robot's services on this computer. What they are:
-canbase_deploy."""
+"""`canbase setup install` and `uninstall`: a robot's services on this computer. What they are: canbase_deploy."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def canbase(
 
 _DRIVE: Final = "Drive"
 _LOOK: Final = "Monitor and diagnose"
-_GROUPS: Final = "More, by subject: `canbase GROUP --help`"
+_GROUPS: Final = "More, by subject"
 _ROS: Final[dict[str, Any]] = {"cls": RosCommand, "options_metavar": ROS_USAGE}
 _GOAL: Final[dict[str, Any]] = {"cls": GoalCommand, "options_metavar": ROS_USAGE}
 

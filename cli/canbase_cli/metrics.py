@@ -41,10 +41,10 @@ def metrics(
     except ModuleNotFoundError as error:
         if str(error.name).partition(".")[0] != "prometheus_client":
             raise
-        fail(f"canbase metrics needs the Python package prometheus-client: {EXTRA}", WRONG_INPUT)
+        fail(f"canbase serve metrics needs the Python package prometheus-client: {EXTRA}", WRONG_INPUT)
     try:
         problem = run(robot, (host, port), arguments, lambda where: typer.echo(f"serving {where}"), name or ())
     except OSError as error:
         fail(f"{host}:{port} cannot be had: {error.strerror}; give another --port or --host", FAILED)
     if problem:
-        fail(f"canbase metrics ends: {problem}", FAILED)
+        fail(f"canbase serve metrics ends: {problem}", FAILED)

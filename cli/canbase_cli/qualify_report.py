@@ -1,5 +1,4 @@
-"""The end of `canbase prove qualify`, and `canbase prove qualify --report`: writes the report of a folder of
-results."""
+"""The end of `canbase prove qualify`, and its `--report`: writes the report of a folder of results."""
 
 from __future__ import annotations
 

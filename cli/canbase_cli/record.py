@@ -25,7 +25,7 @@ TURN_S: Final = 0.2
 
 
 EPILOG: Final = (
-    "Examples:  \ncanbase record                    the last seconds, into the folder of the black box  \n"
+    "Examples:  \ncanbase record start              the last seconds, into the folder of the black box  \n"
     "canbase record start --seconds 5 --out turn.asc;  canbase explain turn.asc  \n"
     "canbase record start --mcap run.mcap    every topic until Ctrl-C"
 )

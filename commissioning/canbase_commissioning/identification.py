@@ -1,5 +1,4 @@
-"""The active part of `canbase bus scan`: queries the identity of every node id by SDO reads (CiA 301, 1000h, 1017h,
-1018h).
+"""`canbase bus scan`, active part: queries the identity of every node id by SDO reads (CiA 301, 1000h, 1018h).
 
 Names and firmware (1008h, 100Ah) take segmented transfers and are read only where no other client uses the channel.
 """

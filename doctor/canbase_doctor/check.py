@@ -86,7 +86,7 @@ def commissioning(loaded: Loaded) -> list[Check]:
     if not why:
         return [ok("commissioning", "done, and robot.yaml has not changed since"), *_self_stop_proof(loaded)]
     slow = f"no faster than safety.uncommissioned_mps, {uncommissioned_mps(loaded.robot):g} m/s"
-    cure = "canbase commission: wrong signs and scales show on the floor alone"
+    cure = "canbase setup commission: wrong signs and scales show on the floor alone"
     return [warn("commissioning", f"{why}; {slow}", cure), *_self_stop_proof(loaded)]
 
 

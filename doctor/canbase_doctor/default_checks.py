@@ -83,7 +83,7 @@ def watchdog(evidence: Evidence) -> list[Check]:
         return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
     age, view = _age(status.watchdog_age_s), watchdog_view(status.watchdog)
     if view is WatchdogView.MISSING:
-        return [fail("watchdog", f"missing, last frame {age} ago", "start canbase watchdog on the same robot.yaml")]
+        return [fail("watchdog", f"missing, last frame {age} ago", "start canbase serve watchdog on the same robot.yaml")]
     told = f"last frame {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
     if view is WatchdogView.OK:
         found = ok("watchdog", f"ok, {told}")
@@ -150,7 +150,7 @@ def safety_filter(evidence: Evidence) -> list[Check]:
     found = f"{state.cause}: {state.detail}" if state.detail else state.cause
     if state.lease_errors > heard.first.lease_errors:
         lost = f"{state.lease_errors} leases could not be delivered to {evidence.robot.lease.socket}"
-        return [fail("safety_filter", lost, "is canbase watchdog running, with the same lease.socket?")]
+        return [fail("safety_filter", lost, "is canbase serve watchdog running, with the same lease.socket?")]
     if state.action == SafetyState.STOP:
         return [fail("safety_filter", f"stops, {found}", _until(state.clears_on))]
     if state.action == SafetyState.PASS:

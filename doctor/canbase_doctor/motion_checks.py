@@ -58,7 +58,7 @@ def mux_owner(seen: Evidence) -> Check:
                 name, f"{topic} is published by {', '.join(nodes)}", "every source goes through a topic of mux.sources"
             )
     if mux is None:
-        return fail(name, "velocity_mux publishes nothing", "start canbase velocity")
+        return fail(name, "velocity_mux publishes nothing", "start canbase serve velocity")
     if mux.active not in ("", seen.robot.mux.action_source):
         return fail(name, f"{mux.active} drives", "release it, or end its node")
     return ok(name, mux.active or "no active source")
@@ -160,7 +160,7 @@ def command_interface(seen: Evidence) -> Check:
                 cure = f"set mux.sources.{source}.{key}, or " if key else ""
                 return fail(name, found, f"{cure}let it send {described.message_type}")
     if not seen.subscribers.get("cmd_vel"):
-        return fail(name, "no subscriber on cmd_vel", "start canbase driver, in the same namespace")
+        return fail(name, "no subscriber on cmd_vel", "start canbase serve driver, in the same namespace")
     return ok(name, f"{len(seen.robot.mux.sources)} sources with the right type; the driver listens")
 
 

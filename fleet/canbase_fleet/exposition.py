@@ -51,7 +51,7 @@ class Exposition:
             ages.add_metric((topic,), math.inf if last.age_s is None else last.age_s)
         yield ages
         stops = CounterMetricFamily(
-            f"{PREFIX}stops", "Stops since canbase metrics was started.", labels=("stopped_by", "cause")
+            f"{PREFIX}stops", "Stops since canbase serve metrics was started.", labels=("stopped_by", "cause")
         )
         for kind, count in self._view.stops.items():
             stops.add_metric(kind, count)

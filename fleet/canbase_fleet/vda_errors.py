@@ -24,7 +24,7 @@ from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 MOST: Final = 50
 """Errors in one message."""
 FATAL, WARNING = "FATAL", "WARNING"
-PROCESSES: Final = {DRIVER: "canbase driver", SAFETY: "canbase velocity", MUX: "canbase velocity"}
+PROCESSES: Final = {DRIVER: "canbase serve driver", SAFETY: "canbase serve velocity", MUX: "canbase serve velocity"}
 STARTING: Final = (DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING)
 PASSING: Final = (
     *(Cause.NONE, Cause.BOOTING, Cause.PREPARING, Cause.NO_RECORD, Cause.ENABLING),

@@ -40,7 +40,7 @@ def write_report(folder: Path, loaded: Loaded) -> tuple[Report, list[Path]]:
     OSError.
     """
     made = read_report(folder, loaded)
-    title, told = f"canbase qualify: {made.setup.robot.name}", sections(made)
+    title, told = f"canbase prove qualify: {made.setup.robot.name}", sections(made)
     texts = {
         JSON: json.dumps(as_json(made), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
         MARKDOWN: markdown(title, told),

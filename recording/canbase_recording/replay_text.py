@@ -1,5 +1,4 @@
-"""What `canbase record replay` reports, in words and as plain values for JSON. Pure. Times: seconds of the
-recording."""
+"""What `canbase record replay` reports, in words and for JSON. Pure. Times: seconds of the recording."""
 
 from __future__ import annotations
 

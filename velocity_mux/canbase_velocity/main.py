@@ -50,7 +50,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
     try:
         held, writer = take("velocity process", robot.lease.socket), hold(folder, "velocity")
     except TakenError as error:
-        print(f"canbase velocity: {error}", file=sys.stderr)
+        print(f"canbase serve velocity: {error}", file=sys.stderr)
         return 1
     with held, writer, _stop_signals() as received:
         rclpy.init(args=list(ros_args), signal_handler_options=SignalHandlerOptions.NO)

@@ -39,6 +39,6 @@ class SolePublisher:
             self.problem = ""
             return
         self._latched = now_s - sorted(self._since[key] for key in keys)[1] >= LATCHED_S
-        until = "until the next start of canbase velocity" if self._latched else "until one is left"
+        until = "until the next start of canbase serve velocity" if self._latched else "until one is left"
         named = ", ".join(sorted(nodes)[:3])
         self.problem = f"{len(keys)} publishers ({named}): give each scanner a topic and a key of its own; {until}"

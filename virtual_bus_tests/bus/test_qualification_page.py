@@ -30,7 +30,7 @@ def ticks(shown: Any) -> str:
 def test_plots_choices_and_tables(width: int, height: int, dark: bool, tmp_path: Path) -> None:
     report = made(passed())
     file = tmp_path / "report.html"
-    file.write_text(page("canbase qualify: bench", report, sections(report)), encoding="utf-8")
+    file.write_text(page("canbase prove qualify: bench", report, sections(report)), encoding="utf-8")
     with browser() as player:
         shown, complaints = offline_page(player, file, DRAWN, width=width, height=height, dark=dark)
         assert shown.evaluate("document.documentElement.scrollWidth") <= width

@@ -81,10 +81,13 @@ def page_texts() -> Iterator[Text]:
 
 def commands() -> dict[str, Any]:
     """The click command of each line of words after `canbase`; "" is canbase itself."""
-    found: dict[str, Any] = {"": typer.main.get_command(app)}
-    for name, command in found[""].commands.items():
-        found[name] = command
-        found |= {f"{name} {sub}": each for sub, each in getattr(command, "commands", {}).items()}
+    return _below("", typer.main.get_command(app))
+
+
+def _below(name: str, command: Any) -> dict[str, Any]:
+    found = {name: command}
+    for word, each in getattr(command, "commands", {}).items():
+        found |= _below(f"{name} {word}".strip(), each)
     return found
 
 
@@ -102,12 +105,14 @@ def calls(text: str) -> Iterator[tuple[str, ...]]:
 
 
 def what_is_wrong(words: tuple[str, ...], known: dict[str, Any]) -> str:
-    """Why there is no such command line; empty: there is. A first word that is no command is the finding itself."""
-    first, *rest = words
-    if first and not first.startswith("-") and first not in known:
-        return first
-    name = "" if first.startswith("-") else first
-    name = f"{name} {rest[0]}" if name and rest and f"{name} {rest[0]}" in known else name
+    """Why there is no such command line; empty: there is. A word that is no command is the finding itself."""
+    name = ""
+    for word in words:
+        if f"{name} {word}".strip() not in known:
+            if word and not word.startswith("-") and hasattr(known[name], "commands"):
+                return word
+            break
+        name = f"{name} {word}".strip()
     options = [word.partition("=")[0] for word in words if word.startswith("--") and len(word) > len("--")]
     if "--ros-args" in options:
         options = options[: options.index("--ros-args")]

@@ -32,7 +32,7 @@ class Relay:
         try:
             settings = self._gpiod.LineSettings(direction=direction)
             self._request = self._gpiod.request_lines(
-                line.chip, consumer="canbase watchdog", config={line.offset: settings}
+                line.chip, consumer="canbase serve watchdog", config={line.offset: settings}
             )
         except (OSError, ValueError) as error:
             raise RelayError(

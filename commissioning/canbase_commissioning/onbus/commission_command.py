@@ -1,5 +1,4 @@
-"""`canbase setup commission` on the bus: step by step, the report, robot.yaml. What is measured is in
-`commissioning`."""
+"""`canbase setup commission` on the bus: steps, report, robot.yaml. `commissioning` decides what is measured."""
 
 from __future__ import annotations
 

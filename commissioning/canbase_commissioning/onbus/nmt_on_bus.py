@@ -1,5 +1,4 @@
-"""`canbase bus nmt` on the bus: looks at the motors, asks, sends, and shows what the nodes report. See
-`nmt_command.py`."""
+"""`canbase bus nmt` on the bus: asks, sends, and shows what the nodes report. See `nmt_command.py`."""
 
 from __future__ import annotations
 

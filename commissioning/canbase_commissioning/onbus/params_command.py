@@ -1,5 +1,4 @@
-"""`canbase bus params save` and `diff` on the bus. What is read and compared is decided in
-`commissioning/parameters`."""
+"""`canbase bus params save` and `diff` on the bus. `commissioning/parameters` decides what is read and compared."""
 
 from __future__ import annotations
 

@@ -88,6 +88,6 @@ def _cure(drive: Drive, expected: Expected) -> str:
     return (
         "The drive has lost or changed its settings, and would turn its wheel otherwise than ordered: set them again "
         f"(canbase bus params restore, or the maker's tool). If the change is meant, take {expected.index:04X}h:"
-        f"{expected.sub} out of `expects` of {drive.joint} in robot.yaml, and then, with the wheels up: canbase "
-        "commission --steps directions,scale"
+        f"{expected.sub} out of `expects` of {drive.joint} in robot.yaml, and then, with the wheels up: "
+        "canbase setup commission --steps directions,scale"
     )

@@ -69,7 +69,7 @@ def run(
     try:
         claim.listen()
     except (TakenError, BusError) as error:
-        print(f"canbase driver: {error}", file=sys.stderr)
+        print(f"canbase serve driver: {error}", file=sys.stderr)
         return 1
     received: list[int] = []
 

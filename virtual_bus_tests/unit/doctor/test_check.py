@@ -118,7 +118,7 @@ def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> Non
         (changed("motor_driver/status", state=DriverStatus.BOOTING), "motor_driver", "warn", "booting"),
         (changed("motor_driver/status", state=200), "motor_driver", "FAIL", "offline"),
         (changed("motor_driver/status", watchdog="OK"), "watchdog", "FAIL", "unknown: none"),
-        (changed("motor_driver/status", watchdog="missing"), "watchdog", "FAIL", "start canbase watchdog"),
+        (changed("motor_driver/status", watchdog="missing"), "watchdog", "FAIL", "start canbase serve watchdog"),
         (changed("motor_driver/status", watchdog="tripped", watchdog_rung=3), "watchdog", "FAIL", "disable voltage"),
         (changed("motor_driver/status", watchdog="tripped", watchdog_rung=9), "watchdog", "FAIL", "reset node"),
         (changed("motor_driver/status", watchdog_trips=2), "watchdog's counters", "warn", "trips grew"),

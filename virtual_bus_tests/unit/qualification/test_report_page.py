@@ -14,7 +14,7 @@ from support.made_results import KILLED, made, never, passed, scenario, stops
 EVIL = "<img src=x onerror=alert(1)> `b` | \u202e </script>"
 
 
-def page_of(report: Report, title: str = "canbase qualify: bench") -> str:
+def page_of(report: Report, title: str = "canbase prove qualify: bench") -> str:
     return page(title, report, sections(report))
 
 

@@ -92,9 +92,10 @@ def test_every_command_that_a_page_shows_exists_and_takes_its_options() -> None:
     ("text", "wrong"),
     [
         ("set it with canbase adpot", ["adpot"]),
+        ("set it with canbase bus adpot", ["adpot"]),
         ("first canbase setup commission --steps directions,scale; then canbase doctor.", []),
-        ("first canbase setup commission --stages directions", ["commission takes no --stages"]),
-        ("`canbase bus sdo read 1 6041 --chanel can0`", ["sdo read takes no --chanel"]),
+        ("first canbase setup commission --stages directions", ["setup commission takes no --stages"]),
+        ("`canbase bus sdo read 1 6041 --chanel can0`", ["bus sdo read takes no --chanel"]),
         ("canbase drive 1.0 --ros-args -p x:=1 --anything", []),
         ("(canbase bus scan), or --this of another tool", []),
         ("run canbase bus scan. --this begins another sentence", []),

@@ -74,7 +74,7 @@ def test_the_line_is_an_output_that_begins_inactive(chip: FakeChip, monkeypatch:
 
     monkeypatch.setattr("gpiod.LineSettings", settings)
     with Relay(LINE):
-        assert chip.consumer == "canbase watchdog"
+        assert chip.consumer == "canbase serve watchdog"
     assert [(each.direction, each.output_value, each.active_low) for each in asked] == [
         (gpiod.line.Direction.OUTPUT, Value.INACTIVE, False)
     ]
