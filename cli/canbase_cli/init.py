@@ -13,7 +13,7 @@ EPILOG: Final = (
     "Examples:  \n"
     "canbase setup init --channel can0  \n"
     "canbase setup init --interface slcan --channel /dev/ttyACM0 --bitrate 500000 --output robot.yaml  \n"
-    "canbase setup init --config robot.yaml --output new.yaml      (the same bus; on a bench while canbase serve sim runs)"
+    "canbase setup init --config robot.yaml --output new.yaml      (the same bus; while canbase serve sim runs)"
 )
 
 

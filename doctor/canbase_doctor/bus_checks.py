@@ -131,7 +131,7 @@ def _watchdog(seen: BusEvidence) -> list[Check]:
     if state is None:
         if not seen.canbase_runs:
             return []
-        return [fail("watchdog's state (1FEh)", "never received", "start canbase serve watchdog on the same robot.yaml")]
+        return [fail("watchdog's state (1FEh)", "never received", "start canbase serve watchdog with this robot.yaml")]
     age_s = seen.now_s - seen.heard.watchdog_at
     lease = "none yet" if state.lease_age_ms == LEASE_AGE_UNKNOWN else f"{state.lease_age_ms} ms old"
     found = f"{('starting', 'watching', 'tripped')[state.state]}, received {age_s * 1000:.0f} ms ago; lease {lease}"
@@ -140,7 +140,7 @@ def _watchdog(seen: BusEvidence) -> list[Check]:
         rows.append(fail("watchdog's heartbeat (77Eh)", "not received", "it withholds it after a trip: canbase reset"))
     if DRIVER_NODE_ID not in seen.heard.nodes:
         rows.append(
-            fail("driver's heartbeat (77Fh)", "not received", "canbase serve driver does not run, or hangs: see its log")
+            fail("driver's heartbeat (77Fh)", "not received", "motor_driver does not run, or hangs: see its log")
         )
     return [*rows, *([_counters(seen.heard.counters)] if seen.heard.counters else [])]
 
@@ -243,7 +243,7 @@ def _advice(seen: BusEvidence, node_id: int) -> str:
     """What a difference beside a running driver means: a drive in NMT operational was booted by it, the others not."""
     node = seen.heard.nodes.get(node_id)
     if node is not None and node.nmt_state is NmtState.OPERATIONAL:
-        return "something has changed it since its boot: restart canbase serve driver, and look for another master or tool"
+        return "something has changed it since its boot: restart motor_driver, and look for another master or tool"
     return "the driver could not boot this drive: the reason is in its log and in boot_problem of motor_driver/status"
 
 

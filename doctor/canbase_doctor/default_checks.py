@@ -83,7 +83,7 @@ def watchdog(evidence: Evidence) -> list[Check]:
         return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
     age, view = _age(status.watchdog_age_s), watchdog_view(status.watchdog)
     if view is WatchdogView.MISSING:
-        return [fail("watchdog", f"missing, last frame {age} ago", "start canbase serve watchdog on the same robot.yaml")]
+        return [fail("watchdog", f"missing, last frame {age} ago", "start canbase serve watchdog with this robot.yaml")]
     told = f"last frame {age} ago; last lease {_age(status.watchdog_lease_age_s)} old"
     if view is WatchdogView.OK:
         found = ok("watchdog", f"ok, {told}")

@@ -1,4 +1,4 @@
-"""The page `Commission`: the questions of `canbase setup commission` and `canbase setup init`, with the wheels drawn."""
+"""The page `Commission`: the questions of `canbase setup commission` and `setup init`, with the wheels drawn."""
 
 from __future__ import annotations
 

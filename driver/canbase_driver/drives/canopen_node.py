@@ -55,8 +55,8 @@ comes again after the next boot, as late but for this share, the boots after tha
 factor, and the extra. Once alone it is a drive that lost its supply."""
 NO_HEARTBEAT = f"no heartbeat (1017h; {GUARDING_ALONE})"
 NO_ANSWER = (
-    "no answer to a node guarding request of the watchdog: start canbase serve watchdog. If it runs, its CAN adapter or the "
-    "drive has no remote frames (RTR): use another adapter, or set self_stop.node_guarding: false in its drive "
+    "no answer to a node guarding request of the watchdog: start canbase serve watchdog. If it runs, its CAN adapter "
+    "or the drive has no remote frames (RTR): use another adapter, or set self_stop.node_guarding: false in its drive "
     "profile, and the drive does not stop when this computer fails"
 )
 RESET_FACTOR, RESET_EXTRA_S, LONGEST_RESET_S = 1.3, 0.5, 30.0
