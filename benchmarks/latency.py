@@ -118,7 +118,7 @@ def _figure(what: str, parts: Sequence[str], topic: str, margin_s: float, orders
         robot = load_robot(path).robot
         bus = stack.enter_context(can.Bus(**robot.bus.arguments()))
         for part in ("sim", "watchdog", *parts):
-            process = Process([*CANBASE, part, "--config", str(path)], folder / f"{part}.log", env)
+            process = Process([*CANBASE, "serve", part, "--config", str(path)], folder / f"{part}.log", env)
             stack.callback(process.close)
         floor_process = Process(
             [sys.executable, "-c", FLOOR_CODE, json.dumps(robot.bus.arguments())], folder / "floor.log", env

@@ -81,12 +81,12 @@ def _start(count: int) -> tuple[float, float]:
         path = robot_file(folder, {"drives": drives(count)})
         bus = stack.enter_context(can.Bus(**load_robot(path).robot.bus.arguments()))
         for part in ("sim", "watchdog"):
-            stack.callback(Process([*CANBASE, part, "--config", str(path)], folder / f"{part}.log", env).close)
+            stack.callback(Process([*CANBASE, "serve", part, "--config", str(path)], folder / f"{part}.log", env).close)
         time.sleep(2.5)
         while bus.recv(0.0) is not None:
             pass
         began_s = time.monotonic()
-        stack.callback(Process([*CANBASE, "driver", "--config", str(path)], folder / "driver.log", env).close)
+        stack.callback(Process([*CANBASE, "serve", "driver", "--config", str(path)], folder / "driver.log", env).close)
         first_s, enabled_s = _listen(bus, count)
     return first_s - began_s, enabled_s - first_s
 

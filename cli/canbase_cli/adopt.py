@@ -51,10 +51,10 @@ def adopt(
     Exit codes: 0 all drives ready, 1 not, 2 wrong command line or robot.yaml, 130 Ctrl-C.
     """
     from canbase_commissioning.onbus.adopt_command import run
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_config.bit_rate import BIT_RATES
 
-    bus = choose_bus(config, interface, channel, bitrate)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     wanted = bitrate or bus.bitrate
     for rate in (wanted, present):
         if rate is not None and rate not in BIT_RATES:
@@ -63,4 +63,4 @@ def adopt(
             )
     if wanted != bus.bitrate:
         fail(f"--bitrate {wanted} contradicts bus.bitrate of robot.yaml, {bus.bitrate}: change it there", WRONG_INPUT)
-    run(bus, robot_if_given(config), answers, present, yes=yes, sets_link=sets_link)
+    run(bus, robot, answers, present, yes=yes, sets_link=sets_link)

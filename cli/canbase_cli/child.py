@@ -1,4 +1,4 @@
-"""A part of the stack as the child of another process: `python -m canbase_cli.child PARENT_PID driver …`.
+"""A part of the stack as the child of another process: `python -m canbase_cli.child PARENT_PID serve driver …`.
 
 It gets SIGTERM when that parent ends, however it ends: no part may go on driving.
 """

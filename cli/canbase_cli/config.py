@@ -15,7 +15,9 @@ from canbase_runtime.terminal import FAILED, colour, fail, load_config, warn
 if TYPE_CHECKING:
     from canbase_config.robot import Bus
 
-app = typer.Typer(help="Check a robot.yaml, list its keys, draft a drive profile.", no_args_is_help=True)
+app = typer.Typer(
+    help="robot.yaml: check it, list its keys, draft a drive profile from an EDS (from-eds).", no_args_is_help=True
+)
 
 
 @app.callback()

@@ -45,14 +45,13 @@ def dump(
 
     Exit codes: 0 ended by Ctrl-C or by its reader, 1 the bus failed, 2 wrong command line or robot.yaml.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_config.eds_file import EdsError
     from canbase_recording.explain_file import known_objects
     from canbase_recording.live_bus import LiveBus, LiveBusError
     from canbase_recording.live_words import LiveWords
 
-    bus = choose_bus(config, interface, channel, bitrate)
-    robot = robot_if_given(config)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     try:
         words = LiveWords(robot, known_objects(eds or ()), frozenset(nodes or ()), frozenset(kinds or ()))
     except EdsError as error:

@@ -30,11 +30,11 @@ def emcy(
 
     Exit codes: 0 read or emptied, 1 no answer, refused, or the drive keeps no history, 2 wrong command line.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.emcy_command import run_clear, run_emcy
 
-    bus = choose_bus(config, interface, channel, bitrate)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     if clear:
         run_clear(bus, node, timeout_s, yes=yes)
     else:
-        run_emcy(bus, robot_if_given(config), node, timeout_s)
+        run_emcy(bus, robot, node, timeout_s)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from canbase_action_server.fibonacci_client import Numbers
     from canbase_action_server.goal_client import SentGoal
 
-app = typer.Typer(help="An action to learn with; nothing moves.", no_args_is_help=True)
+app = typer.Typer(help="An action to learn with: serve it, send it a goal. Nothing moves.", no_args_is_help=True)
 PeriodOption = Annotated[float, typer.Option("--period", metavar="SECONDS", min=0.01, max=10.0, help="for one number")]
 
 

@@ -53,4 +53,4 @@ def init(
     from canbase_commissioning.onbus.init_command import run
 
     named = channel if config else channel or "can0"
-    run(choose_bus(config, interface, named, bitrate), output, answers, timeout_s, yes=yes, as_json=as_json)
+    run(choose_bus(config, interface, named, bitrate)[0], output, answers, timeout_s, yes=yes, as_json=as_json)

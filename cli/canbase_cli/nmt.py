@@ -55,11 +55,11 @@ def nmt(
     Exit codes: 0 the nodes report the state, or show none, 1 refused or not obeyed, 2 wrong command line.
     """
     from canbase_commissioning.nmt_command import Order
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.nmt_on_bus import run_nmt
 
     if node != ALL and not (node.isdecimal() and 1 <= int(node) <= 127):
         raise typer.BadParameter(f"{node!r} is no node: expected 1 to 127, or all", param_hint="NODE")
-    bus = choose_bus(config, interface, channel, bitrate)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     target = 0 if node == ALL else int(node)
-    run_nmt(bus, robot_if_given(config), target, Order(order.value), timeout_s, force=force, yes=yes)
+    run_nmt(bus, robot, target, Order(order.value), timeout_s, force=force, yes=yes)

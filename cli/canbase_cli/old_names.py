@@ -1,7 +1,8 @@
-"""Commands that had another name up to version 0.1: they work, and say the new one. Delete this file in version 0.3."""
+"""Commands that had another name up to version 0.1: they work, and a terminal shows the new one. To go in 0.3."""
 
 from __future__ import annotations
 
+import sys
 from typing import Any, Final
 
 import typer
@@ -19,14 +20,14 @@ NEW: Final = {name: (group, name) for group, names in GROUPS.items() for name in
     "support-bundle": ("record", "bundle")
 }
 OF_RECORD: Final = ("start", "replay", "export", "bundle", "--help", "-h")
-"""What follows `record` now. Before, it was a command: an option or nothing followed."""
+"""What follows `record` now. Before, it was a command: nothing or an option followed, and still may."""
 
 
 def renamed(words: list[str]) -> list[str] | None:
     """The words of a command line with the new name; None: its name is no old one."""
     if not words:
         return None
-    if words[0] == "record" and words[1:2] and words[1] not in OF_RECORD:
+    if words[0] == "record" and (words[1:] == [] or words[1] not in OF_RECORD):
         return ["record", "start", *words[1:]]
     return [*NEW[words[0]], *words[1:]] if words[0] in NEW else None
 
@@ -35,9 +36,9 @@ class OldNames(TyperGroup):
     """The commands of canbase, by their old names too."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """As every group. An old name is said to be one on stderr."""
-        words = renamed(args)
-        if words is not None:
-            now = " ".join(word for word in words[:2])
-            typer.echo(f"canbase {args[0]} is now: canbase {now}", err=True)
+        """As every group. A person at a terminal learns the new name; scripts and launch files that take each line on
+        stderr for a failure do not."""
+        words = None if ctx.resilient_parsing and args[:1] == ["record"] else renamed(args)
+        if words is not None and sys.stderr.isatty() and not ctx.resilient_parsing:
+            typer.echo(f"canbase {args[0]} is now: canbase {' '.join(words[:2])}", err=True)
         return super().resolve_command(ctx, words or args)

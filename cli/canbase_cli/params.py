@@ -70,11 +70,11 @@ def save(
 
     Exit codes: 0 written, 1 no answer, 2 wrong command line, EDS or robot.yaml.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.params_command import run_save
 
-    bus = choose_bus(config, interface, channel, bitrate)
-    run_save(bus, robot_if_given(config), node, eds, out, timeout_s, overwrite=overwrite)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
+    run_save(bus, robot, node, eds, out, timeout_s, overwrite=overwrite)
 
 
 @app.command("diff", epilog=DIFF_EPILOG)
@@ -103,8 +103,8 @@ def diff(
     from canbase_commissioning.onbus.params_command import Side, run_diff
 
     needs_bus = any(Side.of(word).node for word in (first, second))
-    bus = choose_bus(config, interface, channel, bitrate) if needs_bus else None
-    run_diff(bus, robot_if_given(config), first, second, eds, timeout_s, all_=everything)
+    bus, robot = choose_bus(config, interface, channel, bitrate) if needs_bus else (None, robot_if_given(config))
+    run_diff(bus, robot, first, second, eds, timeout_s, all_=everything)
 
 
 @app.command("restore", epilog=RESTORE_EPILOG)
@@ -133,12 +133,12 @@ def restore(
     Exit codes: 0 the drive has the settings of the file, 1 refused, not everything, or no answer, 2 wrong command line
     or file.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.params_restore import run_restore
 
-    bus = choose_bus(config, interface, channel, bitrate)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     run_restore(
-        bus, robot_if_given(config), file, node, timeout_s,
+        bus, robot, file, node, timeout_s,
         yes=yes, other_firmware=other_firmware, without_statusword=without_statusword,
     )  # fmt: skip
 
@@ -158,12 +158,11 @@ def store(
 
     Refused under the conditions of restore. Exit codes: 0 stored, 1 refused or no answer, 2 wrong command line.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.params_restore import run_order
     from canbase_commissioning.parameters.storing import Order
 
-    bus = choose_bus(config, interface, channel, bitrate)
-    robot = robot_if_given(config)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     run_order(bus, robot, node, Order.STORE, group.value, yes=yes, without_statusword=without_statusword)
 
 
@@ -184,10 +183,9 @@ def defaults(
 
     Exit codes: 0 ordered, 1 refused or no answer, 2 wrong command line.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.params_restore import run_order
     from canbase_commissioning.parameters.storing import Order
 
-    bus = choose_bus(config, interface, channel, bitrate)
-    robot = robot_if_given(config)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
     run_order(bus, robot, node, Order.DEFAULTS, group.value, yes=yes, without_statusword=without_statusword)

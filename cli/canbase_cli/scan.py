@@ -42,8 +42,8 @@ def scan(
     Exit codes: 0 nodes found, and all nodes of --config, 1 none, not all, or several drives with one node id, 2 wrong
     command line or robot.yaml.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.scan_command import run
 
-    bus = choose_bus(config, interface, channel, bitrate)
-    run(bus, robot_if_given(config), seconds, timeout_s, passive=passive, yes=yes, as_json=as_json)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
+    run(bus, robot, seconds, timeout_s, passive=passive, yes=yes, as_json=as_json)

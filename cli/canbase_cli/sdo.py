@@ -76,11 +76,12 @@ def read(
 
     Exit codes: 0 read, 1 refused by the drive or no answer, 2 wrong command line or robot.yaml.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.sdo_command import Target, run_read
 
-    target = Target.of(node, at, kind, eds, robot_if_given(config))
-    run_read(choose_bus(config, interface, channel, bitrate), target, timeout_s, raw=raw, ignore_eds=ignore_eds)
+    bus, robot = choose_bus(config, interface, channel, bitrate)
+    target = Target.of(node, at, kind, eds, robot)
+    run_read(bus, target, timeout_s, raw=raw, ignore_eds=ignore_eds)
 
 
 @app.command("write", epilog=WRITE_EPILOG, context_settings={"ignore_unknown_options": True})
@@ -109,10 +110,9 @@ def write(
 
     Exit codes: 0 written and read back, 1 refused or no answer, 2 wrong command line, value or robot.yaml.
     """
-    from canbase_commissioning.onbus.bus_session import choose_bus, robot_if_given
+    from canbase_commissioning.onbus.bus_session import choose_bus
     from canbase_commissioning.onbus.sdo_command import Target, run_write
 
-    target = Target.of(node, at, kind, eds, robot_if_given(config))
-    run_write(
-        choose_bus(config, interface, channel, bitrate), target, value, timeout_s, force=force, ignore_eds=ignore_eds
-    )
+    bus, robot = choose_bus(config, interface, channel, bitrate)
+    target = Target.of(node, at, kind, eds, robot)
+    run_write(bus, target, value, timeout_s, force=force, ignore_eds=ignore_eds)

@@ -14,11 +14,13 @@ import typer
 
 from canbase_cli.options import (
     ROS_USAGE,
+    BenchOption,
     ConfigOption,
     NamespaceOption,
     RosCommand,
     UnusedNamespaceOption,
     check_unused_ros_arguments,
+    named,
     right_start,
     ros_arguments,
     ros_needed,
@@ -28,12 +30,14 @@ from canbase_runtime.latch_file import latch_folder
 from canbase_runtime.own_folder import replaced
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.single_instance import TakenError, bus_name, check
-from canbase_runtime.terminal import FAILED, fail, load_config
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
+from canbase_runtime.which_robot import VARIABLE
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
     from canbase_driver.runtime.claim import Claim
 
+_UNNAMED: Final = "name the robot: --config FILE, or CANBASE_ROBOT=FILE. A component runs for no robot that is found"
 SERVICES: Final = ("driver", "velocity", "action-server", "watchdog", "sim")
 """Names of the commands here."""
 WITHOUT_ROS: Final = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
@@ -60,7 +64,7 @@ def driver(
 
     Arguments after --ros-args go to rclpy.
     """
-    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
+    robot, arguments = _robot_named(config), ros_arguments(ctx, namespace)
     claim = _claim(robot)
     with ros_needed():
         from canbase_driver.runtime.main import run
@@ -91,7 +95,7 @@ def velocity(ctx: typer.Context, config: ConfigOption = None, namespace: Namespa
 
     Arguments after --ros-args go to rclpy.
     """
-    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
+    robot, arguments = _robot_named(config), ros_arguments(ctx, namespace)
     with ros_needed():
         from canbase_velocity.main import run
     with right_start():
@@ -103,7 +107,7 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
 
     Arguments after --ros-args go to rclpy.
     """
-    robot, arguments = load_config(config).robot, ros_arguments(ctx, namespace)
+    robot, arguments = _robot_named(config), ros_arguments(ctx, namespace)
     with ros_needed():
         from canbase_action_server.main import run
 
@@ -116,6 +120,7 @@ def action_server(ctx: typer.Context, config: ConfigOption = None, namespace: Na
 def sim(
     ctx: typer.Context,
     config: ConfigOption = None,
+    bench: BenchOption = False,
     namespace: UnusedNamespaceOption = "",
     control: Annotated[
         Path | None, typer.Option("--control", metavar="PATH", help="Unix socket that controls the simulation.")
@@ -128,7 +133,7 @@ def sim(
     """Run simulated drives on the robot's bus, in place of the real ones."""
     from canbase_sim.main import run
 
-    robot = load_config(config).robot
+    robot = _robot_named(config, bench=bench)
     check_unused_ros_arguments(ctx)
     raise_priority("sim")
     path = None if control is None else str(control)
@@ -147,7 +152,7 @@ def watchdog(
     """
     from canbase_config.derive import watchdog_config
 
-    robot = load_config(config).robot
+    robot = _robot_named(config)
     check_unused_ros_arguments(ctx)
     leave_stop_file(robot, stop_file)
     if stop_file is None:
@@ -195,6 +200,14 @@ def leave_stop_file(robot: Robot, path: Path | None) -> None:
             file.write(watchdog_config(robot).to_json().encode())
     except OSError as error:
         fail(f"{path} cannot be written: {error}; without it the drives cannot be stopped after a crash", FAILED)
+
+
+def _robot_named(config: Path | None, *, bench: bool = False) -> Robot:
+    """Of a component, which opens a bus and stays: it means no robot that only happens to be here."""
+    path = named(config, bench=bench)
+    if path is None and not os.environ.get(VARIABLE):
+        fail(_UNNAMED, WRONG_INPUT)
+    return load_config(path).robot
 
 
 def add_services(app: typer.Typer) -> None:

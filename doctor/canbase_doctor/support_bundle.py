@@ -30,7 +30,7 @@ from canbase_doctor.careful_read import RefusedError, modified, names, read_end
 from canbase_doctor.service_environment import service_environment
 from canbase_runtime.own_folder import replaced
 from canbase_runtime.terminal import FAILED, colour, fail
-from canbase_runtime.which_robot import ETC
+from canbase_runtime.which_robot import ETC, NoRobotError, which_robot
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
     from canbase_config.robot import Robot
@@ -275,7 +275,7 @@ def _packages() -> str:
 def support_bundle(
     config: Annotated[
         Path | None,
-        typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the installed"),
+        typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the robot here"),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .tar.gz.", show_default="here, by date")
@@ -290,16 +290,20 @@ def support_bundle(
     Exit codes: 0 written, 1 not written.
     """
     from canbase_config.errors import ConfigError
-    from canbase_config.load import load_robot, sample
+    from canbase_config.load import load_robot
 
-    file = config or installed_robot(ETC) or sample("bench")
+    file = config or installed_robot(ETC) or Path("robot.yaml")
     try:
+        meant = which_robot(config)
+        file = meant.path
         loaded = load_robot(file)
-    except ConfigError as error:  # the bundle is needed then above all
+    except (ConfigError, NoRobotError) as error:  # the bundle is needed then above all
         problems = str(error)
         typer.secho(f"{file} cannot be used; collected all the same:\n{problems}", err=True, color=colour())
         bundle, robot = collect(None, file, since, problems=problems), file.stem
     else:
+        if meant.why:
+            typer.echo(f"robot {loaded.robot.name}: {file} ({meant.why})", err=True)
         bundle, robot = collect(loaded.robot, loaded.path, since, named=loaded.files), loaded.robot.name
     path = output or Path(f"canbase-support-{robot}-{time.strftime('%Y%m%dT%H%M%S')}.tar.gz")
     try:

@@ -93,8 +93,9 @@ def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
     """A file to write. At the end of the block it is on disk (fsync) and takes the place of `path`, file or link.
 
     Where anything raises before that, `path` is as it was and nothing is left beside it. `private`: for this user
-    alone; otherwise with the mode of the one before, and its owner and group where this user may give them. Does not
-    judge the folder: `open_own_folder` does. Raises OSError, also where `path` is no regular file.
+    alone; otherwise with the mode, owner and group of the one before. Where this user may not give files away, it is
+    this user's, and nobody else may write it. Does not judge the folder: `open_own_folder` does. Raises OSError, also
+    where `path` is no regular file.
     """
     folder, new = os.open(path.parent, os.O_DIRECTORY | os.O_CLOEXEC), f".{path.name}.{os.urandom(4).hex()}"
     before = None
@@ -108,9 +109,12 @@ def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
         try:
             with open(path.with_name(new), "wb", opener=lambda *_: descriptor) as file:
                 if before:
-                    with suppress(PermissionError):  # only root gives files away
+                    bits = 0o777
+                    try:
                         os.fchown(descriptor, before.st_uid, before.st_gid)
-                    os.fchmod(descriptor, before.st_mode & 0o777)
+                    except PermissionError:  # only root gives files away; nobody else may write what is now ours
+                        bits = 0o755
+                    os.fchmod(descriptor, before.st_mode & bits)
                 yield file
                 file.flush()
                 os.fsync(descriptor)

@@ -56,13 +56,14 @@ def _address(task: str, name: str) -> str:
 
 def holder(task: str, name: str) -> int | None:
     """Process id of the present holder; None: there is none. Raises OSError where the kernel does not report it."""
-    return holder_at(_address(task, name))
+    found = holder_at(_address(task, name))
+    return found and found[0]
 
 
-def holder_at(address: str) -> int | None:
-    """The same by the address of its socket, which begins with a zero byte."""
+def holder_at(address: str) -> tuple[int, int] | None:
+    """The same by the address of its socket, which begins with a zero byte: process and user id."""
     try:
-        return _holder(address)[0]
+        return _holder(address)
     except ConnectionRefusedError:
         return None
 

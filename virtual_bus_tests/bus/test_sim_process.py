@@ -155,7 +155,7 @@ def test_a_wrong_robot_file_is_2(tmp_path: Path) -> None:
 
 
 def test_without_a_simulator_the_client_says_how_to_start_one(tmp_path: Path) -> None:
-    with pytest.raises(ControlError, match="canbase sim"):
+    with pytest.raises(ControlError, match="canbase serve sim"):
         SimControl(tmp_path / "sim.sock")
 
 

@@ -19,19 +19,23 @@ MOST_FRAMES = 100
 """After this many frames in a row it is the session's turn."""
 
 
-def choose_bus(config: Path | None, interface: str | None, channel: str | None, bitrate: int | None) -> Bus:
-    """The bus of the command line, or that of the robot that is meant where it names none. Exits with 2 when it makes
-    no sense."""
+def choose_bus(
+    config: Path | None, interface: str | None, channel: str | None, bitrate: int | None
+) -> tuple[Bus, Robot | None]:
+    """The bus, and the robot whose it is. Where the command line names neither, those of the robot that is meant; where
+    it names a bus alone, no robot. Exits with 2 when it makes no sense."""
     if interface is None and channel is None:
-        return load_config(config).robot.bus
+        robot = load_config(config).robot
+        return robot.bus, robot
     kind = interface or "socketcan"
     values: dict[str, object] = {"interface": kind, "channel": channel or "can0"}
     if bitrate is not None:
         values["bitrate"] = bitrate
     try:
-        return Bus.model_validate(values)
+        bus = Bus.model_validate(values)
     except ValidationError as error:
         fail(f"--interface, --channel, --bitrate: {error.errors()[0]['msg']}", WRONG_INPUT)
+    return bus, robot_if_given(config)
 
 
 def robot_if_given(config: Path | None) -> Robot | None:

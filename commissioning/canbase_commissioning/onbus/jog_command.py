@@ -42,7 +42,9 @@ def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None
         fail(f"there is no wheel {joint!r} in robot.yaml, expected one of {', '.join(joints)}", WRONG_INPUT)
     if not sys.stdin.isatty():
         fail("jog needs an interactive terminal", WRONG_INPUT)
-    if not yes and not typer.confirm("WHEELS UP, nothing near them, the emergency stop (STO) at hand and tried?"):
+    if not yes and not typer.confirm(
+        f"{robot.name}, {robot.bus.channel}: WHEELS UP, nothing near them, the emergency stop (STO) at hand and tried?"
+    ):
         fail("not confirmed", FAILED)
     with open_line(robot.bus) as line, stopping_signals():
         refuse_beside_masters(line)

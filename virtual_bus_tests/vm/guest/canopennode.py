@@ -192,4 +192,4 @@ def _is_adopted(robot: Robot) -> None:
         robot.spin(1.0)
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
     if done.returncode != 1 or "node 1 refuses 6041h, so it is no CiA 402 drive" not in done.stderr:
-        raise BrokenPromiseError(f"canbase adopt: exit code {done.returncode}: {done.stdout}{done.stderr}")
+        raise BrokenPromiseError(f"canbase bus adopt: exit code {done.returncode}: {done.stdout}{done.stderr}")
