@@ -1,5 +1,4 @@
-"""`canbase record start` beside a robot of real processes: written while it drives, and read by all that read a
-stop's."""
+"""`canbase record start` beside a robot of real processes: written as it drives, read by all that read a stop's."""
 
 from __future__ import annotations
 
@@ -28,7 +27,7 @@ def robot() -> Iterator[RunningRobot]:
 
 def record(robot: RunningRobot, *options: str) -> tuple[int, str, str]:
     """Exit code, stdout, stderr; the test's node goes on meanwhile, so that its goal does too."""
-    words = [*CANBASE, "record", *options]
+    words = [*CANBASE, "record", "start", *options]
     with subprocess.Popen(words, env=os.environ | robot.env, stdout=PIPE, stderr=PIPE, text=True) as process:
         robot.node.wait_for(lambda: process.poll() is not None, 60.0, "canbase record start")
         told, problem = process.communicate()
