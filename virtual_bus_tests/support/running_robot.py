@@ -47,6 +47,7 @@ PATIENT: Mapping[str, Any] = {
         "odometry_s": 1.0,
     },
     "safety": {"command_timeout_s": 0.5},
+    "watchdog": {"loop_late_s": 0.5},
 }
 """For tests that are not about timeouts: a loaded machine must not trip them."""
 
