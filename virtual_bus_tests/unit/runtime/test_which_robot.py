@@ -124,7 +124,7 @@ def test_the_services_of_an_installed_robot_name_it_to_everybody(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Their executable is seen by root and their own user alone."""
-    monkeypatch.setattr(rule.own_process, "refusal", lambda *_words: "cannot be checked")
+    monkeypatch.setattr("canbase_runtime.own_process.refusal", lambda *_words: "cannot be checked")
     installed = tmp_path / "robot.yaml"
     with holds("driver", "driver", "--config", str(installed), cwd=tmp_path) as table:
         assert rule.running({installed: "installed"}, table) == {installed: "runs here"}
