@@ -135,7 +135,7 @@ _record.command("replay", epilog=replay.EPILOG)(replay.replay)
 _record.command("export", epilog=export.EPILOG)(export.export)
 _record.command("bundle")(support_bundle.support_bundle)
 
-_prove = _group("prove", "qualify a robot in simulation, gather evidence, benchmark canbase on this computer.")
+_prove = _group("prove", "qualify a robot in simulation, gather evidence, benchmark this computer.")
 _prove.command("qualify", epilog=qualify.EPILOG)(qualify.qualify)
 _prove.command("evidence", epilog=evidence.EPILOG)(evidence.evidence)
 _prove.command("benchmark")(benchmark.benchmark)
