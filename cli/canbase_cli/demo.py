@@ -296,7 +296,7 @@ def _domain() -> Iterator[int]:
 
 
 def _robot_file(folder: Path) -> Path:
-    """The sample of the bench on a free port, with a lease socket of its own and patient timeouts."""
+    """The sample of the bench on a free port, with a separate lease socket and long timeouts."""
     from ruamel.yaml import YAML
 
     from canbase_config.load import sample

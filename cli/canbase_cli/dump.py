@@ -1,4 +1,4 @@
-"""`canbase bus dump`: the frames of a bus as they come, in words. It sends nothing."""
+"""`canbase bus dump`: the frames of a bus as they are received, decoded. It sends nothing."""
 
 from __future__ import annotations
 

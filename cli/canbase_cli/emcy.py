@@ -1,4 +1,4 @@
-"""`canbase bus emcy`: the errors that a drive has and remembers, in words; and it forgets them on request."""
+"""`canbase bus emcy`: the present and the stored errors of a drive, decoded; `--clear` empties the history."""
 
 from __future__ import annotations
 

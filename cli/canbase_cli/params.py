@@ -21,7 +21,7 @@ DIFF_EPILOG: Final = (
     "Examples:  \ncanbase bus params diff left.dcf 1 --config robot.yaml      (what has changed since)  \n"
     "canbase bus params diff 1 2 --eds maker.eds --channel can0  (two drives)  \n"
     "canbase bus params diff left.dcf boot --config robot.yaml   (what canbase sets at its start)  \n"
-    "canbase bus params diff maker.eds 1 --channel can0          (against the maker's defaults)"
+    "canbase bus params diff maker.eds 1 --channel can0          (against the manufacturer's defaults)"
 )
 RESTORE_EPILOG: Final = (
     "Examples:  \ncanbase bus params restore left.dcf --config robot.yaml  \n"

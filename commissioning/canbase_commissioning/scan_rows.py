@@ -47,7 +47,7 @@ def scan_rows(
 def twins_advice(twins: Set[int]) -> str:
     """What to do about node ids that several drives have."""
     nodes = ", ".join(map(str, sorted(twins)))
-    return f"node {nodes}: two drives or more answer. canbase bus adopt gives each drive a node id of its own"
+    return f"node {nodes}: two drives or more answer. canbase bus adopt gives each drive a separate node id"
 
 
 def silent(heard: dict[int, HeardNode], cards: dict[int, NodeCard]) -> list[str]:

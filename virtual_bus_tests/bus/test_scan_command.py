@@ -41,7 +41,7 @@ def test_two_drives_with_one_node_id_are_named_at_once(tmp_path: Path) -> None:
     with drives(config, "--factory-fresh"):
         done = canbase("bus", "scan", "--config", str(at_the_rate_of_the_drives), "--seconds", "0.3", "--json")
     assert done.returncode == 1
-    assert "node 1: two drives or more answer. canbase bus adopt gives each drive a node id of its own" in done.stderr
+    assert "node 1: two drives or more answer. canbase bus adopt gives each drive a separate node id" in done.stderr
     row = json.loads(done.stdout)[0]
     assert (row["node_id"], row["serial"]) == (1, None)
 
