@@ -97,52 +97,56 @@ def _trip(path: Path, other: Robot | None) -> Replay:
     from canbase_recording import replay_text as words
     from canbase_recording.replay_compare import compare_alone
     from canbase_recording.replay_file import read_trip
-    from canbase_recording.replay_trip import replay_own, replay_trip
+    from canbase_recording.replay_trip import replay_trip
 
     inputs = read_trip(path)
-    found = replay_own(inputs, path.name)
-    values: dict[str, Any] = {"watchdog": words.watchdog_values(inputs, found)}
-    lines = list(words.watchdog_lines(inputs, found))
+    values, lines, agrees = _watchdog(inputs, path.name, inputs)
     if other is not None:
         comparison = compare_alone(inputs.head.config, other, lambda config: replay_trip(inputs, config))
         values["other_robot_yaml"] = words.comparison_values(inputs, comparison)
         lines += words.comparison_lines(inputs, comparison)
-    return values, lines, not any(life.differs for life in found.lives)
+    return values, lines, agrees
 
 
 def _stop(path: Path, other: Robot | None) -> Replay:
     """Both files of the driver, and those of watchdog, mux and filter where they lie beside them."""
     from canbase_recording import replay_text as words
-    from canbase_recording.replay import replay_watchdog
     from canbase_recording.replay_file import read_inputs, robot_of, trip_beside, velocity_beside
-    from canbase_recording.replay_trip import replay_own
 
     inputs = read_inputs(path)
-    beside, velocity = trip_beside(path, inputs), velocity_beside(path, inputs)
-    found = replay_watchdog(inputs) if beside is None else replay_own(beside[1], beside[0])
-    driver_values, driver_lines, driver_agrees = _setpoints(inputs, robot_of(inputs))
-    if velocity is None:
-        chain_values, chain_lines, chain_agrees = _sources(inputs, robot_of(inputs))
-    else:
-        chain_values, chain_lines, chain_agrees = _beside(velocity[1], velocity[0], inputs, other)
-    stop = f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {inputs.at_s - inputs.began_s:.3f} s"
+    trip, velocity = trip_beside(path, inputs), velocity_beside(path, inputs)
+    parts = (
+        _not_replayed(words.NO_WATCHDOG) if trip is None else _watchdog(trip[1], trip[0], inputs),
+        _not_replayed(words.NO_VELOCITY) if velocity is None else _beside(velocity[1], velocity[0], inputs, other),
+        _setpoints(inputs, robot_of(inputs)),
+    )
     values: dict[str, Any] = {
         "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
         "versions": dict(inputs.versions),
-        "watchdog": words.watchdog_values(inputs, found),
-        **driver_values,
-        **chain_values,
+        "not_replayed": [told for part, _, _ in parts for told in part.pop("not_replayed", ())],
     }
-    lines = [stop, *words.watchdog_lines(inputs, found), *chain_lines, *driver_lines]
+    lines = [f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {values['stop']['at_s']:.3f} s"]
+    for part, told, _ in parts:
+        values |= part
+        lines += told
     if other is not None:
-        values["other_robot_yaml"], more = _with_other(inputs, other, beside and beside[1])
+        values["other_robot_yaml"], more = _with_other(inputs, other, trip and trip[1])
         lines += more
-    if other is not None and velocity is None:
-        mux_values, mux_lines, _ = _sources(inputs, other)
-        values["other_robot_yaml"] |= mux_values
-        lines += (f"  {line}" for line in mux_lines)
-    agrees = driver_agrees and chain_agrees and not any(life.differs for life in found.lives)
-    return values, lines, agrees
+    return values, lines, all(agrees for _, _, agrees in parts)
+
+
+def _not_replayed(why: str) -> Replay:
+    return {"not_replayed": [why]}, [why], True
+
+
+def _watchdog(own: TripInputs, name: str, zero: Begun) -> Replay:
+    """`name`: of its file."""
+    from canbase_recording import replay_text as words
+    from canbase_recording.replay_trip import replay_own
+
+    found = replay_own(own, name)
+    agrees = not any(life.differs for life in found.lives)
+    return {"watchdog": words.watchdog_values(zero, found)}, list(words.watchdog_lines(zero, found)), agrees
 
 
 def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot | None) -> Replay:
@@ -152,18 +156,7 @@ def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot
     try:
         return _mux_and_filter(own, name, inputs, other)
     except NoInputsError as error:
-        told = f"mux and filter: cannot tell, {name}: {error}"
-        return {"not_replayed": told}, [told], True
-
-
-def _sources(inputs: RecordedInputs, robot: Robot) -> Replay:
-    """Of the mux what the driver's recording shows; the filter is not replayed without its own file."""
-    from canbase_recording import replay_text as words
-    from canbase_recording.replay_sources import replay_sources
-
-    sources = replay_sources(inputs, robot)
-    values = {"mux": words.source_values(inputs, sources), "not_replayed": words.NOT_REPLAYED}
-    return values, [*words.source_lines(inputs, sources), words.NOT_REPLAYED], not sources.differences
+        return _not_replayed(f"mux and filter: cannot tell, {name}: {error}")
 
 
 def _setpoints(inputs: RecordedInputs, robot: Robot) -> Replay:
@@ -176,11 +169,19 @@ def _setpoints(inputs: RecordedInputs, robot: Robot) -> Replay:
 
 
 def _with_other(inputs: RecordedInputs, other: Robot, own: TripInputs | None) -> tuple[dict[str, Any], list[str]]:
+    """The watchdog by its own file, where there is one, and the driver's setpoints."""
+    from canbase_config.derive import watchdog_config
     from canbase_recording import replay_text as words
-    from canbase_recording.replay_compare import compare
+    from canbase_recording.replay_compare import compare, refuse_other_drives
     from canbase_recording.replay_trip import replay_trip
 
-    comparison = compare(inputs, other, None if own is None else lambda config: replay_trip(own, config))
+    refuse_other_drives(inputs.watchdog, watchdog_config(other))
     values, told, _ = _setpoints(inputs, other)
-    lines = [*words.comparison_lines(inputs, comparison), *(f"  {line}" for line in told)]
-    return words.comparison_values(inputs, comparison) | values, lines
+    indented = [f"  {line}" for line in told]
+    if own is None:
+        return values, ["with the other robot.yaml:", *indented]
+    comparison = compare(inputs, other, lambda config: replay_trip(own, config))
+    return words.comparison_values(inputs, comparison) | values, [
+        *words.comparison_lines(inputs, comparison),
+        *indented,
+    ]

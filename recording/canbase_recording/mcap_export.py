@@ -31,7 +31,7 @@ from canbase_recording.note_events import NoteEvents
 from canbase_recording.notes import CommandNote, parse_note
 from canbase_recording.pdo_layouts import PdoLayouts
 from canbase_recording.recording_file import RecordingFile
-from canbase_recording.ros_types import whole_definition
+from canbase_recording.ros_definition import whole_definition
 from canbase_recording.wheel_states import WheelStates
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 
@@ -59,7 +59,8 @@ class McapExport:
         file.add_topic(NOTES_TOPIC, TEXT_TYPE, TEXT_DEFINITION)
         for topic, kind in _TYPES.items():
             suffix = self._raw if topic in (JOINTS_TOPIC, ORDERED_TOPIC) else ""
-            file.add_topic(topic + suffix, kind, whole_definition(kind))
+            package, name = kind.split("/msg/")
+            file.add_topic(topic + suffix, kind, whole_definition(package, name))
 
     def run(self) -> str:
         """All of it. Returns why the file is not complete; empty: it is. Raises OSError."""

@@ -26,11 +26,6 @@ class McapFile:
         """How many topics it has."""
         return len(self._channels)
 
-    @property
-    def size(self) -> int:
-        """In bytes; before `close` without the last chunk."""
-        return self._path.stat().st_size
-
     def add_topic(self, topic: str, type_name: str, definition: str) -> None:
         """A topic of a type such as nav_msgs/msg/Odometry, with its whole definition. Raises OSError."""
         if type_name not in self._schemas:

@@ -9,17 +9,13 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any, Final
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_recording.bus_times import heard_times
 from canbase_recording.entry import Entry, FrameKind, RecordedFrame
 
 FORMAT: Final = 1
 """canbase_driver.runtime.black_box_json writes it."""
-STAMP_S: Final = 1.0
-"""The stamps of one clock are this near to each other, seen from the receiver [s]: others are not the filter's."""
 
 
 class NoInputsError(Exception):
@@ -28,20 +24,11 @@ class NoInputsError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A message on cmd_vel that the driver received at `at_s` [s]; `sent_s`: when the filter sent it, and its lease.
-
-    None: its stamp is not of the filter's clock, as of a message that somebody else published there.
-    """
+    """A message on cmd_vel that the driver received at `at_s` [s]."""
 
     at_s: float
-    sent_s: float | None
     linear_mps: float
     angular_radps: float
-
-    @property
-    def is_finite(self) -> bool:
-        """The filter sends nothing else."""
-        return math.isfinite(self.linear_mps) and math.isfinite(self.angular_radps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +53,7 @@ class RecordedInputs:
     """One recorded stop. All times: monotonic seconds of the robot's computer."""
 
     frames: tuple[RecordedFrame, ...]
-    """In the order in which they were on the bus; `sent`: by the driver, where no echo came back."""
+    """Each once; `sent`: by the driver, where no echo came back."""
     commands: tuple[Command, ...]
     happenings: tuple[Happening, ...]
     began_s: float
@@ -80,8 +67,6 @@ class RecordedInputs:
     robot_yaml: Mapping[str, Any]
     profiles: Mapping[str, str]
     watchdog: WatchdogConfig
-    bitrate: int
-    """[bit/s]"""
     versions: Mapping[str, str]
 
     @property
@@ -106,10 +91,9 @@ def recorded_inputs(entries: Iterable[Entry], told: Mapping[str, Any]) -> Record
         happenings = tuple(_happenings(told["events"]))
         robot_yaml, profiles = dict(told["robot_yaml"]), dict(told["profiles"])
         frames = tuple(_frames(entries, began_s))
-        bitrate = int(robot_yaml["bus"]["bitrate"])
         return RecordedInputs(
-            frames=_as_heard(frames, watchdog.bus_arguments, bitrate),
-            commands=tuple(_commands(happenings)),
+            frames=_each_once(frames, watchdog.bus_arguments),
+            commands=tuple(_command(each) for each in happenings if each.what == "cmd_vel"),
             happenings=happenings,
             began_s=began_s,
             wall_offset_s=float(told["wall_offset_s"]),
@@ -120,7 +104,6 @@ def recorded_inputs(entries: Iterable[Entry], told: Mapping[str, Any]) -> Record
             robot_yaml=robot_yaml,
             profiles=profiles,
             watchdog=watchdog,
-            bitrate=bitrate,
             versions=dict(told.get("versions", {})),
         )
     except KeyError as error:
@@ -148,13 +131,11 @@ def _frames(entries: Iterable[Entry], began_s: float) -> Iterator[RecordedFrame]
             yield entry._replace(at_s=began_s + entry.at_s)
 
 
-def _as_heard(
-    frames: tuple[RecordedFrame, ...], bus_arguments: Mapping[str, Any], bitrate: int
-) -> tuple[RecordedFrame, ...]:
-    """As all others heard them, and when: echoes are that, and where there are none, sent frames had to wait."""
+def _each_once(frames: tuple[RecordedFrame, ...], bus_arguments: Mapping[str, Any]) -> tuple[RecordedFrame, ...]:
+    """Where what the driver sends comes back, the echo has the time at which it was on the bus."""
     if hears_itself(bus_arguments, frames):
         return tuple(frame for frame in frames if not frame.sent)
-    return heard_times(frames, bitrate)
+    return frames
 
 
 def _happenings(events: Sequence[Mapping[str, Any]]) -> Iterator[Happening]:
@@ -164,19 +145,5 @@ def _happenings(events: Sequence[Mapping[str, Any]]) -> Iterator[Happening]:
             yield Happening(at_s, str(event["what"]), event)
 
 
-def _commands(happenings: Iterable[Happening]) -> list[Command]:
-    """The wall clock may be wrong, and the one of another computer too: what counts is the usual distance."""
-    found = [each for each in happenings if each.what == "cmd_vel"]
-    distances = [each.number("stamp_s") - each.at_s for each in found]
-    known = [distance for distance in distances if math.isfinite(distance)]
-    usual_s = median(known) if known else math.nan
-    near = [distance for distance in known if abs(distance - usual_s) <= STAMP_S]
-    offset_s = max(near, default=math.nan)
-    """The message that was on the way for the shortest time: the least that the clocks are apart."""
-    return [_command(each, distance, offset_s) for each, distance in zip(found, distances, strict=True)]
-
-
-def _command(event: Happening, distance_s: float, offset_s: float) -> Command:
-    late_s = offset_s - distance_s
-    sent_s = event.at_s - late_s if 0.0 <= late_s <= STAMP_S else None
-    return Command(event.at_s, sent_s, event.number("linear_mps"), event.number("angular_radps"))
+def _command(event: Happening) -> Command:
+    return Command(event.at_s, event.number("linear_mps"), event.number("angular_radps"))

@@ -16,8 +16,7 @@ from canbase_config.robot import Robot
 from canbase_config.watchdog import WatchdogConfig, WatchedLayout
 from canbase_recording.config_changes import Change, changes, of_the_watchdog
 from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs
-from canbase_recording.recorded_watchdog import Trip
-from canbase_recording.replay import Replayed, replay_watchdog
+from canbase_recording.replay_trip import Replayed, Trip
 
 SAME_S: Final = 0.0005
 """Two replays of the same inputs differ by less where nothing has changed [s]."""
@@ -58,10 +57,8 @@ Replay = Callable[[WatchdogConfig], tuple[Replayed, ...]]
 """The lives of the watchdog that ran, with this configuration."""
 
 
-def compare(inputs: RecordedInputs, other: Robot, replay: Replay | None = None) -> Comparison:
-    """`replay`: None: by the driver's recording alone. Raises NoInputsError where the other robot has other drives:
-    then the frames mean something else."""
-    replay = replay or (lambda config: replay_watchdog(inputs, config).lives)
+def compare(inputs: RecordedInputs, other: Robot, replay: Replay) -> Comparison:
+    """Raises NoInputsError where the other robot has other drives: then the frames mean something else."""
     config = watchdog_config(other)
     refuse_other_drives(inputs.watchdog, config)
     config = replace(config, lease_socket=inputs.watchdog.lease_socket)

@@ -8,14 +8,12 @@ from typing import Any, Final, Protocol
 
 from canbase_driver.supervision.watchdog_link import CAUSES
 from canbase_recording.recorded_inputs import RecordedInputs
-from canbase_recording.recorded_watchdog import Trip
-from canbase_recording.replay import Replayed, WatchdogReplay
 from canbase_recording.replay_compare import Comparison, Difference
 from canbase_recording.replay_setpoints import SetpointReplay
-from canbase_recording.replay_sources import NOBODY, SourceReplay
+from canbase_recording.replay_trip import Replayed, Trip, WatchdogReplay
 
-MOST_LINES: Final = 20
-NOT_REPLAYED: Final = "safety filter: cannot tell, since the file of the inputs of mux and filter is not beside it"
+NO_WATCHDOG: Final = "watchdog: cannot tell, since its file watchdog_….jsonl (one for each trip) is not beside it"
+NO_VELOCITY: Final = "mux and filter: cannot tell, since their file velocity_….jsonl is not beside it"
 
 
 class Begun(Protocol):
@@ -28,26 +26,9 @@ class Begun(Protocol):
 
 def watchdog_lines(inputs: Begun, found: WatchdogReplay) -> Iterator[str]:
     """The watchdog: what was recorded, and beside it what a new one does."""
-    yield f"watchdog: {found.lease_count} leases, {found.frames} frames {found.source}"
-    yield from (f"  note: {sentence}" for sentence in lease_notes(found))
-    if not found.lives:
-        yield "  no state frame 1FEh of a watchdog that was not tripped: nothing to compare with"
+    yield f"watchdog: {found.leases} leases, {found.frames} frames of its own file {found.file}"
     for life in found.lives:
         yield from (f"  {line}" for line in _life_lines(inputs, life))
-
-
-def lease_notes(found: WatchdogReplay) -> Iterator[str]:
-    """What of the leases is not as plain as it should be."""
-    leases = found.leases
-    if leases.unstamped:
-        yield (
-            f"{leases.unstamped} messages on cmd_vel have no stamp of the filter's clock: they count as somebody "
-            "else's, without a lease"
-        )
-    if leases.lost:
-        yield f"{leases.lost} messages on cmd_vel had no lease, by the age that the watchdog reported"
-    if leases.unheard:
-        yield f"{leases.unheard} leases have no cmd_vel in the recording: they count with the velocity before them"
 
 
 def _life_lines(inputs: Begun, life: Replayed) -> Iterator[str]:
@@ -58,9 +39,6 @@ def _life_lines(inputs: Begun, life: Replayed) -> Iterator[str]:
     yield f"  {verdict(life)}"
     if life.starts:
         yield f"  the replay began {life.starts + 1} times: without its past a new watchdog trips at once there"
-    for begin_s, end_s in life.life.silent:
-        span = f"from {_at(inputs, begin_s)} to {_at(inputs, end_s)}"
-        yield f"  no state frame came {span}: the watchdog did not run, or was not heard"
 
 
 def verdict(life: Replayed) -> str:
@@ -81,13 +59,9 @@ def verdict(life: Replayed) -> str:
 def _same(life: Replayed) -> str:
     if life.trip is None:
         return "the same: no trip"
-    if life.late_s == 0.0 and life.whole:
+    if life.late_s == 0.0:
         return "the same cause, in the same tick"
-    if life.lacks_a_cycle:
-        return "the same cause, where the evidence lasts one cycle of the driver less: a new watchdog began it later"
-    edge = ", within the accuracy of the recorded times: a limit was reached just so" if life.on_edge else ""
-    cycle = ": one cycle of the driver" if life.is_a_cycle_apart else ""
-    return f"the same cause, {abs(life.late_s) * 1000.0:.1f} ms {_later(life.late_s)}{cycle}{edge}"
+    return f"the same cause, {abs(life.late_s) * 1000.0:.1f} ms {_later(life.late_s)}"
 
 
 def _later(late_s: float) -> str:
@@ -143,29 +117,6 @@ def setpoint_lines(inputs: RecordedInputs, found: SetpointReplay) -> Iterator[st
         yield f"  DIFFERS {span}: recorded {each.recorded_mps:.3f} m/s, replayed {each.replayed_mps:.3f} m/s"
 
 
-def source_lines(inputs: RecordedInputs, found: SourceReplay) -> Iterator[str]:
-    """The mux: which source has the base by its orders, beside its recorded states."""
-    orders = ", ".join(f"{name} {count}" for name, count in sorted(found.orders.items())) or "none"
-    yield f"velocity mux: orders of {orders}; {found.compared} states compared, {found.left_out} left out"
-    yield from (f"  {_at(inputs, each.at_s)} {each.source or NOBODY}" for each in found.takeovers[:MOST_LINES])
-    for each in found.differences[:MOST_LINES]:
-        yield f"  DIFFERS at {_at(inputs, each.at_s)}: recorded {each.recorded}, replayed {each.replayed}"
-
-
-def source_values(inputs: RecordedInputs, found: SourceReplay) -> dict[str, Any]:
-    """The same, for JSON."""
-    return {
-        "orders": dict(found.orders),
-        "compared": found.compared,
-        "left_out": found.left_out,
-        "takeovers": [{"at_s": each.at_s - inputs.began_s, "source": each.source} for each in found.takeovers],
-        "differences": [
-            {"at_s": each.at_s - inputs.began_s, "recorded": each.recorded, "replayed": each.replayed}
-            for each in found.differences
-        ],
-    }
-
-
 def setpoint_values(inputs: RecordedInputs, found: SetpointReplay) -> dict[str, Any]:
     """The same, for JSON."""
     return {
@@ -187,10 +138,9 @@ def setpoint_values(inputs: RecordedInputs, found: SetpointReplay) -> dict[str, 
 def watchdog_values(inputs: Begun, found: WatchdogReplay) -> dict[str, Any]:
     """The same as `watchdog_lines`, for JSON."""
     return {
-        "source": found.source,
-        "leases": found.lease_count,
+        "file": found.file,
+        "leases": found.leases,
         "frames": found.frames,
-        "notes": list(lease_notes(found)),
         "lives": [_life_values(inputs, life) for life in found.lives],
     }
 
@@ -202,12 +152,9 @@ def _life_values(inputs: Begun, life: Replayed) -> dict[str, Any]:
         "recorded": _trip_values(inputs, life.life.trip),
         "replayed": _trip_values(inputs, life.trip),
         "agrees": life.agrees,
-        "on_edge": life.on_edge,
-        "a_cycle_apart": life.is_a_cycle_apart,
         "cannot_be_replayed": life.cannot,
         "late_s": None if math.isnan(life.late_s) else life.late_s,
         "began": life.starts + 1,
-        "silent": [[begin - inputs.began_s, end - inputs.began_s] for begin, end in life.life.silent],
     }
 
 

@@ -6,26 +6,97 @@ middle of a life, a new watchdog begins there: what it does not know is what was
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_recording.recorded_leases import Leases
-from canbase_recording.recorded_watchdog import Life, Trip
-from canbase_recording.replay import TICK_S, WARM_UP_S, Replayed, WatchdogReplay
 from canbase_recording.trip_inputs import Call, RecordedVerdict, TripInputs
 from canbase_watchdog.input_ring import END, EXPIRE, FRAME, LEASE, SUSPEND, TICK
 from canbase_watchdog.trip_cause import FINE, TripCause
 from canbase_watchdog.watchdog import Watchdog
 
+TICK_S: Final = 0.005
+"""Of canbase_watchdog.loop."""
+WARM_UP_S: Final = 1.0
+"""A watchdog that knows nothing of what was before may trip within this time [s]: then it is started again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """The watchdog stopped the drives: when [s], why, because of which node (0: none), and its detail."""
+
+    at_s: float
+    cause: TripCause | None
+    """None: a number that this canbase does not know."""
+    node_id: int
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """From a start or a reset of the watchdog, or the begin of the file, to its trip or the end of the file."""
+
+    from_s: float
+    until_s: float
+    trip: Trip | None
+    starts: bool
+    """It begins with the start of a watchdog."""
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """One life of the recorded watchdog, and what a new one does in it. `trip` None: no trip."""
+
+    life: Life
+    trip: Trip | None
+    starts: int = 0
+    """How often it was started again in the warm-up."""
+
+    @property
+    def cannot(self) -> str:
+        """Why this trip cannot be replayed; empty: it can."""
+        if self.life.trip is not None and self.life.trip.cause is None:
+            return "this canbase does not know the cause that was recorded"
+        before_s = self.life.until_s - self.life.from_s
+        if self.life.trip is None or self.agrees or self.life.starts or before_s >= WARM_UP_S:
+            return ""
+        return f"only {before_s:.2f} s are recorded before it; a new watchdog needs {WARM_UP_S:g} s to know its limits"
+
+    @property
+    def late_s(self) -> float:
+        """How much later than the recorded trip [s]; NaN where one of them is missing."""
+        return self.trip.at_s - self.life.trip.at_s if self.trip and self.life.trip else math.nan
+
+    @property
+    def agrees(self) -> bool:
+        """Both trip by the same cause within one tick; or none trips."""
+        if self.trip is None or self.life.trip is None:
+            return self.trip is self.life.trip is None
+        return self.trip.cause is self.life.trip.cause and abs(self.late_s) <= TICK_S
+
+    @property
+    def differs(self) -> bool:
+        """It should do what was recorded, and does not."""
+        return not (self.agrees or self.cannot)
+
+
+@dataclass(frozen=True, slots=True)
+class WatchdogReplay:
+    """All lives in the file of this name, and how many leases and frames it has."""
+
+    lives: tuple[Replayed, ...]
+    leases: int
+    frames: int
+    file: str
+
 
 def replay_own(inputs: TripInputs, name: str) -> WatchdogReplay:
     """`name`: of the file."""
     counts = Counter(call[0] for call in inputs.calls)
-    source = f"of its own file {name}"
-    return WatchdogReplay(replay_trip(inputs), Leases(), counts[LEASE], counts[FRAME], source)
+    return WatchdogReplay(replay_trip(inputs), counts[LEASE], counts[FRAME], name)
 
 
 def replay_trip(inputs: TripInputs, config: WatchdogConfig | None = None) -> tuple[Replayed, ...]:
@@ -65,7 +136,7 @@ def _is_early(trip: Trip, life: Life) -> bool:
 
 
 def _beside(life: Life, trip: Trip | None) -> Replayed:
-    return Replayed(life, trip, 0, TICK_S, 0.0, whole=True)
+    return Replayed(life, trip)
 
 
 def _first(inputs: TripInputs, config: WatchdogConfig, from_s: float, until_s: float, past: Any) -> Trip | None:
@@ -77,12 +148,12 @@ def _lives(inputs: TripInputs) -> Iterator[Life]:
     tripped = bool(inputs.verdicts) and inputs.verdicts[0].cause == TripCause.NONE and not starts
     for verdict in inputs.verdicts:
         if verdict.cause != TripCause.NONE:
-            yield Life(from_s, verdict.at_s, _trip(verdict), starts, ())
+            yield Life(from_s, verdict.at_s, _trip(verdict), starts)
             tripped = True
         elif tripped:
             from_s, starts, tripped = verdict.at_s, False, False
     if not tripped:
-        yield Life(from_s, inputs.ends_s, None, starts, ())
+        yield Life(from_s, inputs.ends_s, None, starts)
 
 
 def _trip(verdict: RecordedVerdict) -> Trip:

@@ -7,13 +7,13 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any, Final
 
-from canbase_recording.replay_sources import NOBODY
 from canbase_recording.replay_text import Begun
 from canbase_recording.replay_velocity import Decided, Held, VelocityReplay
 from canbase_runtime.source_standing import SourceStanding
 from canbase_runtime.stop_cause import StopCause
 
 MOST_LINES: Final = 20
+NOBODY: Final = "no source"
 NO_STATE: Final = "  note: the file has no state of mux and filter at its begin: new ones know nothing of before"
 
 

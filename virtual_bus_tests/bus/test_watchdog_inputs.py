@@ -10,9 +10,8 @@ from pathlib import Path
 import can
 import pytest
 
-from canbase_recording.replay import Replayed
 from canbase_recording.replay_file import read_trip
-from canbase_recording.replay_trip import replay_trip
+from canbase_recording.replay_trip import Replayed, replay_trip
 from canbase_watchdog.trip_cause import TripCause
 from support.watchdog_story import FAULT
 from support.watched_process import Watched, watched_process

@@ -1,9 +1,8 @@
 """`python -m campaign.replays`: black boxes of drawn scenarios, replayed as `canbase record replay` does it. What
 agrees?
 
-Each scenario drives in virtual time with faults; what its driver would have recorded is written to files, read, and fed
-to a new watchdog. Exit code 1: less than AGREE of the trips that a recording can explain come out the same, or a
-control cycle apart.
+Each scenario drives in virtual time with faults; what its watchdog, mux and filter would have recorded is written to
+files, read, and fed to new ones. Exit code 1: less than AGREE of the trips that have a file come out the same.
 """
 
 from __future__ import annotations
@@ -28,10 +27,9 @@ from canbase_campaign.plan import draw_plan
 from canbase_campaign.planned import Plan
 from canbase_campaign.runner import start_of
 from canbase_campaign.world import World
-from canbase_recording.replay import Replayed, replay_watchdog
-from canbase_recording.replay_file import read_inputs, read_trip, read_velocity
-from canbase_recording.replay_text import trip_text, verdict
-from canbase_recording.replay_trip import replay_trip
+from canbase_recording.replay_file import read_trip, read_velocity
+from canbase_recording.replay_text import verdict
+from canbase_recording.replay_trip import Replayed, replay_trip
 from canbase_recording.replay_velocity import VelocityReplay, causes, replay_velocity
 from canbase_watchdog.trip_cause import TripCause
 from support.recorded_stops import record_in_a_copy
@@ -41,7 +39,7 @@ AGREE = 0.9
 STUFFING = (0.9, 1.05)
 """A frame has more or fewer stuff bits than the typical one: else everything lies on one grid, and on its limits."""
 WATCHDOG, FILTER = "watchdog", "mux and filter"
-SAME, CYCLE, CANNOT, DIFFERS = "same within a tick", "a cycle apart", "cannot be replayed", "differs"
+SAME, CANNOT, DIFFERS = "same within a tick", "cannot be replayed", "differs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +49,7 @@ class Outcome:
     seed: int
     faults: tuple[str, ...]
     cause: str
-    """That was recorded; `none`: no trip."""
+    """That was recorded."""
     result: str
     said: str
     late_s: float
@@ -59,7 +57,7 @@ class Outcome:
 
 
 def replayed(seed: int, folder: Path) -> list[Outcome]:
-    """The scenario of this seed: all lives of its watchdog."""
+    """The scenario of this seed: all trips of its watchdog, all stops of its filter."""
     start, plan = start_of(seed), draw_plan(seed)
     path = folder / f"{seed}.asc"
 
@@ -69,20 +67,14 @@ def replayed(seed: int, folder: Path) -> list[Outcome]:
 
     record_in_a_copy(start.world, run, path, plan.bitrate)
     trips = [(at_s, TripCause(cause)) for at_s, cause in json.loads(path.with_suffix(".trips").read_text())]
-    inputs = read_inputs(path)
     own = [life for file in folder.glob("watchdog_*.jsonl") for life in replay_trip(read_trip(file))]
     decided = [replay_velocity(read_velocity(file)) for file in sorted(folder.glob("velocity_*.jsonl"))]
     for file in folder.iterdir():
         file.unlink()
-    heard = replay_watchdog(inputs).lives
     faults = tuple(fault.name for fault in plan.faults)
-    lives = [*(_life_of(at_s, own, heard) for at_s, _ in trips), *(life for life in heard if life.life.trip is None)]
-    causes = [cause for _, cause in trips]
-    return _filter_outcomes(seed, faults, decided) + [
-        _outcome(seed, faults, life, f"{verdict(life)}; {trip_text(inputs, life.trip)}")
-        if life is not None
-        else Outcome(seed, faults, causes[number].name.lower().replace("_", " "), CANNOT, LOST, math.nan)
-        for number, life in enumerate(lives)
+    return [
+        *_filter_outcomes(seed, faults, decided),
+        *(_outcome(seed, faults, cause, _life_of(at_s, own)) for at_s, cause in trips),
     ]
 
 
@@ -102,20 +94,21 @@ def _filter_outcomes(seed: int, faults: tuple[str, ...], decided: Sequence[Veloc
     ]
 
 
-LOST: Final = "the watchdog's process ended before it wrote the inputs of this trip, and the driver recorded none"
+LOST: Final = "the watchdog's process ended before it wrote the inputs of this trip"
 NEAR_S: Final = 0.02
 
 
-def _life_of(at_s: float, own: Sequence[Replayed], heard: Sequence[Replayed]) -> Replayed | None:
-    """By the watchdog's own file, as `canbase record replay` does it; else by the driver's recording."""
-    ends = [life for life in (*own, *heard) if life.life.trip is not None and abs(life.life.trip.at_s - at_s) < NEAR_S]
-    return ends[0] if ends else None
+def _life_of(at_s: float, own: Sequence[Replayed]) -> Replayed | None:
+    ends = (life for life in own if life.life.trip is not None and abs(life.life.trip.at_s - at_s) < NEAR_S)
+    return next(ends, None)
 
 
-def _outcome(seed: int, faults: tuple[str, ...], life: Replayed, said: str) -> Outcome:
-    results = ((life.agrees, SAME), (life.is_a_cycle_apart, CYCLE), (life.cannot, CANNOT), (True, DIFFERS))
-    result = next(name for holds, name in results if holds)
-    return Outcome(seed, faults, life.life.trip.name if life.life.trip else "none", result, said, life.late_s)
+def _outcome(seed: int, faults: tuple[str, ...], cause: TripCause, life: Replayed | None) -> Outcome:
+    name = cause.name.lower().replace("_", " ")
+    if life is None:
+        return Outcome(seed, faults, name, CANNOT, LOST, math.nan)
+    result = SAME if life.agrees else CANNOT if life.cannot else DIFFERS
+    return Outcome(seed, faults, name, result, verdict(life), life.late_s)
 
 
 def _wobble(world: World, plan: Plan) -> None:
@@ -133,7 +126,7 @@ def drawn(stops: int, first: int = 0) -> Iterator[Outcome]:
     with tempfile.TemporaryDirectory(prefix="canbase-replays-") as folder:
         while tripped < stops:
             for outcome in in_a_copy(seed, Path(folder)):
-                tripped += outcome.part == WATCHDOG and outcome.cause != "none"
+                tripped += outcome.part == WATCHDOG
                 yield outcome
             seed += 1
 
@@ -152,9 +145,9 @@ def table(outcomes: Iterable[Outcome]) -> Table:
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for outcome in outcomes:
         counts[outcome.cause][outcome.result] += 1
-    shown = Table("recorded cause", SAME, CYCLE, DIFFERS, CANNOT)
+    shown = Table("recorded cause", SAME, DIFFERS, CANNOT)
     for cause in sorted(counts):
-        shown.add_row(cause, *(str(counts[cause][result]) for result in (SAME, CYCLE, DIFFERS, CANNOT)))
+        shown.add_row(cause, *(str(counts[cause][result]) for result in (SAME, DIFFERS, CANNOT)))
     return shown
 
 
@@ -167,22 +160,20 @@ def main() -> int:
     out, outcomes = Console(), []
     for outcome in drawn(given.stops, given.first):
         outcomes.append(outcome)
-        if outcome.result in (CYCLE, DIFFERS):
+        if outcome.result == DIFFERS:
             told = f"seed {outcome.seed} ({', '.join(outcome.faults)}): recorded {outcome.cause}; {outcome.said}"
             out.print(told, highlight=False, markup=False, soft_wrap=True)
     out.print(table(outcomes))
-    mine = [outcome for outcome in outcomes if outcome.part == WATCHDOG]
-    known = [outcome for outcome in mine if outcome.cause != "none" and outcome.result != CANNOT]
+    known = [outcome for outcome in outcomes if outcome.part == WATCHDOG and outcome.result != CANNOT]
     late_ms = sorted(1000.0 * outcome.late_s for outcome in known if outcome.result == SAME)
     if late_ms:
         out.print(f"replayed minus recorded: {late_ms[0]:.1f} to {late_ms[-1]:.1f} ms", highlight=False)
-    same, near = (sum(outcome.result == result for outcome in known) for result in (SAME, CYCLE))
-    told = f"of {len(known)} trips that a recording can explain {same} are the same within a tick, {near} a cycle apart"
-    out.print(told, highlight=False)
+    same = sum(outcome.result == SAME for outcome in known)
+    out.print(f"of {len(known)} trips that have a file {same} are the same within a tick", highlight=False)
     filtered = [outcome for outcome in outcomes if outcome.part == FILTER]
     agree = sum(outcome.result == SAME for outcome in filtered)
     out.print(f"of {len(filtered)} stops of the safety filter {agree} are the same at the same time", highlight=False)
-    return 0 if same + near >= AGREE * len(known) and agree == len(filtered) else 1
+    return 0 if same >= AGREE * len(known) and agree == len(filtered) else 1
 
 
 if __name__ == "__main__":

@@ -1,122 +1,108 @@
-"""`canbase record start --mcap` beside publishers, and its file as Foxglove's library reads it."""
+"""`canbase record start` beside a robot of real processes: written as it drives, read by all that read a stop's."""
 
 from __future__ import annotations
 
-import random
-import sys
+import json
+import os
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from subprocess import PIPE
 
 import pytest
-from geometry_msgs.msg import TwistStamped
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Bool, String
+from typer.testing import CliRunner
 
-from ros.conftest import Spawn
-from support.ros_harness import Process, TestNode
-from support.running_robot import CANBASE
+from canbase_action_server.outcome import Status
+from canbase_cli.main import app
+from support.running_robot import CANBASE, READY_S, RunningRobot, own_domain, robot_on
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(180)]
 
 
-def messages(path: Path) -> Iterator[tuple[str, str, Any]]:
-    """Topic, type and message, in the order of the file; only a complete file can be read so."""
-    with path.open("rb") as stream:
-        for schema, channel, _message, decoded in make_reader(
-            stream, decoder_factories=[DecoderFactory()]
-        ).iter_decoded_messages():
-            assert schema is not None
-            yield channel.topic, schema.name, decoded
+@pytest.fixture(scope="module")
+def robot() -> Iterator[RunningRobot]:
+    with own_domain() as domain, robot_on(domain) as running:
+        yield running
 
 
-def recording(node: TestNode, spawn: Spawn, path: Path, *options: str) -> Process:
-    """A recorder that has subscribed to `speed`, which is published all the time."""
-    node.repeat(TwistStamped, "speed", 50.0).message = speed(0.25)
-    process = spawn([*CANBASE, "record", "--mcap", str(path), *options])
-    node.wait_for(lambda: node.node.count_subscribers("speed") > 0, 20.0, "the recorder")
-    return process
+def record(robot: RunningRobot, *options: str) -> tuple[int, str, str]:
+    """Exit code, stdout, stderr; the test's node goes on meanwhile, so that its goal does too."""
+    words = [*CANBASE, "record", "start", *options]
+    with subprocess.Popen(words, env=os.environ | robot.env, stdout=PIPE, stderr=PIPE, text=True) as process:
+        robot.node.wait_for(lambda: process.poll() is not None, 60.0, "canbase record start")
+        told, problem = process.communicate()
+        return process.returncode, told.strip(), problem.strip()
 
 
-def speed(mps: float) -> TwistStamped:
-    message = TwistStamped()
-    message.twist.linear.x = mps
-    return message
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output
 
 
-def test_every_topic_with_its_type_until_ctrl_c_and_what_appears_later_from_then_on(
-    test_node: TestNode, spawn: Spawn, tmp_path: Path
+def test_it_is_written_while_the_robot_drives_and_explain_export_and_replay_read_it(
+    robot: RunningRobot, tmp_path: Path
 ) -> None:
-    """A latched button ── recorder ── 1 s ── a new topic ── 3 s ── SIGINT."""
-    path = tmp_path / "run.mcap"
-    button = test_node.node.create_publisher(Bool, "button", LATCHED)
-    button.publish(Bool(data=True))
-    process = recording(test_node, spawn, path)
-    test_node.spin_for(1.0)
-    words = test_node.node.create_publisher(String, "words", LATCHED)
-    words.publish(String(data="späť"))
-    hidden = test_node.node.create_publisher(String, "_hidden", LATCHED)
-    hidden.publish(String(data="no"))
-    test_node.wait_for(lambda: test_node.node.count_subscribers("words") > 0, 20.0, "the new topic's recorder")
-    test_node.spin_for(0.5)
-    process.interrupt()
-    assert process.wait(20.0) == 0
-    found = list(messages(path))
-    by_topic = {topic: (kind, message) for topic, kind, message in found}
-    assert by_topic["/button"][1].data is True
-    assert by_topic["/words"][1].data == "späť"
-    assert by_topic["/speed"][0] == "geometry_msgs/msg/TwistStamped"
-    assert by_topic["/speed"][1].twist.linear.x == 0.25
-    assert sum(topic == "/speed" for topic, _, _ in found) > 50
-    assert not any("_hidden" in topic for topic in by_topic)
-    assert f"{path}: {len(found)} messages of " in process.log()
+    """── goal of 4 m ── at speed ── record --seconds 1 ── a second request at once ── the goal succeeds ──"""
+    robot.make_ready()
+    goal = robot.goal(4.0, 0.3)
+    robot.wait_speed(0.28)
+    out = tmp_path / "driving.asc"
+    code, told, problem = record(robot, "--seconds", "1", "--out", str(out))
+    assert (code, told) == (0, str(out)), problem
+    code, _, problem = record(robot)
+    assert code == 1
+    assert "less than 5 s ago" in problem
+    robot.wait_speed(0.28)
+    result = goal.wait(READY_S)
+    assert result is not None
+    assert result.status is Status.SUCCEEDED
+    values = json.loads(out.with_suffix(".json").read_text())
+    assert (values["stopped_by"], values["cause"]) == ("nobody", "recording requested")
+    assert {"order", "cmd_vel", "velocity_mux/state", "safety_filter/state", "motor_driver/state"} <= {
+        event["what"] for event in values["events"]
+    }
+    assert values["robot_yaml_sha256"]
+    assert values["versions"]["canbase"]
+    code, text = run("explain", str(out))
+    assert code == 0, text
+    assert "No stop was found" in text
+    assert run("record", "export", str(out), "--mcap", str(tmp_path / "driving.mcap"))[0] == 0
+    code, text = run("record", "replay", str(out))
+    assert code == 0, text
 
 
-def test_named_topics_alone_also_a_hidden_one_for_a_while(test_node: TestNode, spawn: Spawn, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    hidden = test_node.node.create_publisher(String, "_hidden", LATCHED)
-    hidden.publish(String(data="yes"))
-    process = recording(test_node, spawn, path, "--topic", "speed", "--topic", "/_hidden", "--seconds", "4")
-    assert process.wait(30.0) == 0
-    assert {topic for topic, _, _ in messages(path)} == {"/speed", "/_hidden"}
+def test_without_out_it_is_beside_the_recordings_of_stops(robot: RunningRobot) -> None:
+    robot.node.spin_for(5.0)
+    code, told, problem = record(robot)
+    assert code == 0, problem
+    assert Path(told).name.startswith("record_")
+    assert Path(told).with_suffix(".json").is_file()
+    assert Path(told).is_relative_to(robot.env["XDG_STATE_HOME"])
 
 
-def test_a_file_that_exists_is_not_touched_and_without_a_message_there_is_no_file(
-    test_node: TestNode, spawn: Spawn, tmp_path: Path
-) -> None:
-    kept = tmp_path / "kept.mcap"
-    kept.write_bytes(b"mine")
-    refused = spawn([*CANBASE, "record", "--mcap", str(kept)])
-    assert refused.wait(30.0) == 2
-    assert "File exists" in refused.log()
-    assert kept.read_bytes() == b"mine"
-    nowhere = spawn([*CANBASE, "record", "--mcap", str(tmp_path / "no" / "folder.mcap")])
-    assert nowhere.wait(30.0) == 2
-    assert "No such file or directory" in nowhere.log()
-    empty = spawn([*CANBASE, "record", "--mcap", str(tmp_path / "none.mcap"), "--topic", "nothing", "--seconds", "1"])
-    assert empty.wait(30.0) == 1
-    assert "no message came" in empty.log()
-    assert not (tmp_path / "none.mcap").exists()
+def test_a_folder_that_cannot_be_written_is_told_to_the_caller_and_the_robot_goes_on(robot: RunningRobot) -> None:
+    """The folder becomes a file: root may write where permissions forbid it."""
+    folder = Path(robot.env["XDG_STATE_HOME"]) / "canbase"
+    away = folder.with_name("away")
+    robot.node.spin_for(5.0)
+    os.rename(folder, away)
+    try:
+        folder.write_text("a file")
+        code, _, problem = record(robot)
+    finally:
+        folder.unlink()
+        os.rename(away, folder)
+    assert code == 1
+    assert f"the black box cannot write to {folder}" in problem
+    robot.make_ready()
 
 
-def test_without_foxgloves_library_it_names_the_package_and_the_command(spawn: Spawn, tmp_path: Path) -> None:
-    code = "import sys; sys.modules['mcap'] = None; from canbase_cli.entry import main; main()"
-    process = spawn([sys.executable, "-c", code, "record", "--mcap", str(tmp_path / "run.mcap")])
-    assert process.wait(30.0) == 2
-    assert "pip install 'mcap>=1.2,<2'" in process.log()
-    assert not (tmp_path / "run.mcap").exists()
-
-
-def test_a_file_that_cannot_grow_ends_it_with_the_reason(test_node: TestNode, spawn: Spawn, tmp_path: Path) -> None:
-    noise = test_node.repeat(String, "noise", 50.0)
-    noise.message = String(data=random.Random(1).randbytes(60_000).hex())
-    path = tmp_path / "run.mcap"
-    process = spawn(["prlimit", "--fsize=1000000", *CANBASE, "record", "--mcap", str(path)])
-    test_node.wait_for(lambda: process.exit_code is not None, 60.0, "its end")
-    assert process.exit_code == 1
-    assert f"{path} is not complete, after " in process.log()
-    assert "File too large" in process.log()
-    assert "Traceback" not in process.log()
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--out", "a.txt"), "must end with .asc"),
+    ],
+)
+def test_what_the_command_line_cannot_mean(options: tuple[str, ...], said: str) -> None:
+    code, text = run("record", "start", *options)
+    assert (code, said in text) == (2, True)

@@ -18,11 +18,6 @@ from canbase_config.robot import Robot
 from canbase_driver.runtime.black_box import MAX_FRAMES
 from canbase_recording.cause import Cause
 from canbase_recording.explain_file import explain_file
-from canbase_recording.replay import replay_watchdog
-from canbase_recording.replay_file import read_inputs
-from canbase_recording.replay_setpoints import replay_setpoints
-from canbase_recording.replay_sources import replay_sources
-from canbase_watchdog.trip_cause import TripCause
 from support.running_robot import RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
@@ -120,23 +115,3 @@ def test_a_source_that_hangs_is_a_stop_that_is_not_latched(robot: RunningRobot) 
     assert (event.cause, event.latched, event.standstill, event.black_box) == ("no_source", False, True, "")
     assert "action: no message for" in event.detail
     assert 0.05 < event.standstill_s < 2.0
-
-
-def test_a_trip_of_real_processes_comes_out_the_same_in_a_replay(robot: RunningRobot) -> None:
-    """The last test of this robot: its velocity process is gone."""
-    began_s = at_speed(robot)
-    robot.send("velocity", signal.SIGKILL)
-    file = Path(event_since(robot, began_s, "watchdog").black_box)
-    robot.node.wait_for(file.exists, WRITTEN_S, str(file))
-    inputs = read_inputs(file)
-    life = replay_watchdog(inputs).lives[-1]
-    assert life.life.trip is not None
-    assert life.trip is not None
-    assert (life.life.trip.cause, life.trip.cause) == (TripCause.LEASE_LOST, TripCause.LEASE_LOST)
-    assert life.agrees, f"{life.late_s * 1000.0:.1f} ms"
-    setpoints = replay_setpoints(inputs, robot.robot)
-    assert setpoints.compared > 50
-    assert setpoints.differences == ()
-    sources = replay_sources(inputs, robot.robot)
-    assert sources.takeovers[-1].source == "action"
-    assert sources.differences == ()

@@ -302,14 +302,14 @@ def test_a_word_that_ros_does_not_know_ends_a_process_before_it_opens_the_bus_or
 
 @pytest.mark.parametrize(
     ("command", "opens"),
-    [("up", "up._refuse_twice"), ("web", "web._token"), ("record", "record.end_signals")],
+    [("up", "up._refuse_twice"), ("web", "web._token")],
 )
 def test_a_word_that_ros_does_not_know_ends_a_command_before_it_takes_a_name_or_a_port(
-    command: str, opens: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, opens: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[Any] = []
     monkeypatch.setattr(f"canbase_cli.{opens}", lambda *given: opened.append(given))
-    words = {"web": ["--token-file", "/none"], "record": ["--mcap", str(tmp_path / "run.mcap")]}.get(command, [])
+    words = {"web": ["--token-file", "/none"]}.get(command, [])
 
     result = CliRunner().invoke(app, [command, *words, "--ros-args", "--bogus"], env={"COLUMNS": "300"})
 

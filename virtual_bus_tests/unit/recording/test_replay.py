@@ -17,43 +17,42 @@ from canbase_campaign.twins import JOYSTICK
 from canbase_cli.main import app
 from canbase_config.robot import Robot
 from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs
-from canbase_recording.recorded_watchdog import Life, Trip
-from canbase_recording.replay import EDGE, Replayed, replay_watchdog
-from canbase_recording.replay_compare import compare
-from canbase_recording.replay_file import read_inputs, robot_of
-from canbase_recording.replay_text import comparison_lines, verdict, watchdog_lines
+from canbase_recording.replay_compare import Comparison, compare
+from canbase_recording.replay_file import read_inputs, read_trip, robot_of
+from canbase_recording.replay_text import comparison_lines, verdict
+from canbase_recording.replay_trip import Life, Replayed, Trip, replay_trip
 from canbase_watchdog.trip_cause import TripCause
 from support.recorded_stops import record_in_a_copy
 
 FAULT_S, AFTER_S = 1.0, 1.5
-CASES = {
-    "velocity_dies": TripCause.LEASE_LOST,
-    "driver_hangs": TripCause.DRIVER_SILENT,
-    "frozen_encoder": TripCause.FEEDBACK_IMPLAUSIBLE,
-    "feedback_lost": TripCause.DRIVE_SILENT,
-}
-"""Faults of the campaign, of a robot that drives at 0.3 m/s."""
 
 
 @pytest.fixture(scope="module")
-def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RecordedInputs]:
-    """By the name of the fault; `nothing`: it drives on. All drive for 3 s before."""
-    folder = tmp_path_factory.mktemp("recordings")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A stop at 0.3 m/s whose velocity process dies, and beside it the watchdog's own file."""
+    path = tmp_path_factory.mktemp("one") / "stop.asc"
     cruise = Cruise(JOYSTICK, 0.3)
-    for name in ("nothing", *CASES):
-        record_in_a_copy(cruise.world, lambda name=name: _go_wrong(cruise, name), folder / f"{name}.asc")  # type: ignore[misc]
-    return {path.stem: read_inputs(path) for path in folder.glob("*.asc")}
+    record_in_a_copy(cruise.world, lambda: _go_wrong(cruise, "velocity_dies"), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def inputs(recorded: Path) -> RecordedInputs:
+    return read_inputs(recorded)
 
 
 def _go_wrong(cruise: Cruise, name: str) -> None:
     clock = cruise.world.clock
     clock.run_until(clock.now_s + FAULT_S)
-    if name in FAULTS:
-        FAULTS[name].begin(cruise.world, cruise.around, FAULTS[name].draw(Random(1)))
+    FAULTS[name].begin(cruise.world, cruise.around, FAULTS[name].draw(Random(1)))
     clock.run_until(clock.now_s + AFTER_S)
-    if name in FAULTS:
-        FAULTS[name].end(cruise.world, cruise.around, FAULTS[name].draw(Random(1)))
+    FAULTS[name].end(cruise.world, cruise.around, FAULTS[name].draw(Random(1)))
     clock.run_until(clock.now_s + 0.2)
+
+
+def compared(recorded: Path, inputs: RecordedInputs, other: Robot) -> Comparison:
+    own = read_trip(recorded.with_name("watchdog_stop_0.jsonl"))
+    return compare(inputs, other, lambda config: replay_trip(own, config))
 
 
 def robot_with(inputs: RecordedInputs, **timeouts: float) -> Robot:
@@ -61,36 +60,9 @@ def robot_with(inputs: RecordedInputs, **timeouts: float) -> Robot:
     return robot.model_copy(update={"timeouts": robot.timeouts.model_copy(update=timeouts)})
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_same_cause_within_a_tick(recordings: dict[str, RecordedInputs], name: str) -> None:
-    life = replay_watchdog(recordings[name]).lives[0]
-    assert life.trip is not None
-    assert life.life.trip is not None
-    assert (life.trip.cause, life.life.trip.cause) == (CASES[name], CASES[name])
-    assert abs(life.late_s) <= 0.006 + EDGE
-    assert life.agrees
-    assert life.starts == 0
-
-
-def test_no_trip_where_there_was_none(recordings: dict[str, RecordedInputs]) -> None:
-    (life,) = replay_watchdog(recordings["nothing"]).lives
-    assert (life.trip, life.life.trip, life.agrees) == (None, None, True)
-    assert life.life.until_s - life.life.from_s > 4.0
-
-
-def test_without_the_leases_of_the_recording_it_would_have_tripped(recordings: dict[str, RecordedInputs]) -> None:
-    """The replay can tell: the same frames with fewer inputs give another verdict."""
-    without = replace(recordings["nothing"], commands=())
-    (life,) = replay_watchdog(without).lives
-    assert life.trip is not None
-    assert not life.agrees
-    assert verdict(life) == "DIFFERS: the watchdog that ran did not trip"
-
-
-def test_a_shorter_timeout_trips_earlier_by_the_difference(recordings: dict[str, RecordedInputs]) -> None:
-    inputs = recordings["velocity_dies"]
+def test_a_shorter_timeout_trips_earlier_by_the_difference(recorded: Path, inputs: RecordedInputs) -> None:
     lease_s = robot_of(inputs).timeouts.lease_s
-    found = compare(inputs, robot_with(inputs, lease_s=lease_s - 0.07))
+    found = compared(recorded, inputs, robot_with(inputs, lease_s=lease_s - 0.07))
     difference = found.differences[0]
     assert difference.earlier_s == pytest.approx(0.07, abs=0.006)
     assert [change.key for change in found.of_the_watchdog] == ["timeouts.lease_s"]
@@ -100,78 +72,56 @@ def test_a_shorter_timeout_trips_earlier_by_the_difference(recordings: dict[str,
 
 
 def test_a_longer_timeout_does_not_trip_until_the_recorded_stop_and_more_is_not_known(
-    recordings: dict[str, RecordedInputs],
+    recorded: Path,
+    inputs: RecordedInputs,
 ) -> None:
-    inputs = recordings["velocity_dies"]
     lease_s = robot_of(inputs).timeouts.lease_s
-    found = compare(inputs, robot_with(inputs, lease_s=lease_s + 0.1))
+    found = compared(recorded, inputs, robot_with(inputs, lease_s=lease_s + 0.1))
     assert found.differences[0].other.trip is None
     assert "the consequence of its stop" in list(comparison_lines(inputs, found))[1]
 
 
-def test_a_key_that_the_watchdog_does_not_know_changes_nothing(recordings: dict[str, RecordedInputs]) -> None:
-    inputs = recordings["velocity_dies"]
-    found = compare(inputs, robot_with(inputs, boot_s=33.0))
+def test_a_key_that_the_watchdog_does_not_know_changes_nothing(recorded: Path, inputs: RecordedInputs) -> None:
+    found = compared(recorded, inputs, robot_with(inputs, boot_s=33.0))
     assert [change.key for change in found.changes] == ["timeouts.boot_s"]
     assert found.of_the_watchdog == ()
     assert all(difference.is_none for difference in found.differences)
 
 
-def test_a_robot_with_other_drives_cannot_be_compared(recordings: dict[str, RecordedInputs]) -> None:
-    inputs = recordings["velocity_dies"]
+def test_a_robot_with_other_drives_cannot_be_compared(recorded: Path, inputs: RecordedInputs) -> None:
     robot = robot_of(inputs)
     drives = tuple(drive.model_copy(update={"node_id": drive.node_id + 10}) for drive in robot.drives)
     with pytest.raises(NoInputsError, match="the drives differ: recorded node 1 axis 0"):
-        compare(inputs, robot.model_copy(update={"drives": drives}))
+        compared(recorded, inputs, robot.model_copy(update={"drives": drives}))
 
 
 def life(recorded: TripCause | None, replayed: TripCause | None, at_s: float = 105.0, **changes: object) -> Replayed:
     trip = None if recorded is None else Trip(105.0, recorded, 0)
     other = None if replayed is None else Trip(at_s, replayed, 0)
-    return replace(Replayed(Life(100.0, 105.0, trip, False, ()), other, 0), **changes)  # type: ignore[arg-type]
+    return replace(Replayed(Life(100.0, 105.0, trip, False), other), **changes)  # type: ignore[arg-type]
 
 
-LEASE, LATE, DRIVER = TripCause.LEASE_LOST, TripCause.LOOP_LATE, TripCause.DRIVER_SILENT
-SILENT = Life(100.0, 105.0, Trip(105.0, LEASE, 0), False, ((104.0, 105.0),))
-SHORT = Life(104.5, 105.0, Trip(105.0, LEASE, 0), False, ())
+LEASE, DRIVER = TripCause.LEASE_LOST, TripCause.DRIVER_SILENT
+UNKNOWN = Life(100.0, 105.0, Trip(105.0, None, 0), False)
+SHORT = Life(104.5, 105.0, Trip(105.0, LEASE, 0), False)
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        (life(LEASE, LEASE), "the same cause, in the same tick"),
         (life(LEASE, LEASE, 104.998), "the same cause, 2.0 ms earlier"),
         (life(None, None), "the same: no trip"),
+        (life(None, LEASE), "DIFFERS: the watchdog that ran did not trip"),
         (life(LEASE, None), "DIFFERS: the replay does not trip"),
         (life(LEASE, DRIVER), "DIFFERS: another cause"),
-        (life(LEASE, LEASE, 104.9), "DIFFERS: the same cause, 0.100 s earlier"),
-        (life(LEASE, LEASE, 104.988), "the same cause, 12.0 ms earlier: one cycle of the driver"),
-        (
-            life(LEASE, LEASE, lacks_a_cycle=True),
-            "the same cause, where the evidence lasts one cycle of the driver less",
-        ),
-        (life(LATE, None), "cannot be replayed: the watchdog's own loop was late"),
-        (life(LEASE, None, life=SILENT), "cannot be replayed: no frame of the watchdog came just before"),
+        (life(LEASE, LEASE, 104.99), "DIFFERS: the same cause, 0.010 s earlier"),
+        (life(LEASE, LEASE, life=UNKNOWN), "cannot be replayed: this canbase does not know the cause"),
         (life(LEASE, None, life=SHORT), "cannot be replayed: only 0.50 s are recorded before it"),
     ],
 )
 def test_what_is_said_of_a_replay(given: Replayed, said: str) -> None:
     assert verdict(given).startswith(said)
-
-
-def test_what_was_recorded_and_what_was_replayed_stand_beside_each_other(recordings: dict[str, RecordedInputs]) -> None:
-    inputs = recordings["velocity_dies"]
-    text = "\n".join(watchdog_lines(inputs, replay_watchdog(inputs)))
-    assert "recorded: " in text
-    assert "trips: lease lost" in text
-    assert "replayed: " in text
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("one") / "stop.asc"
-    cruise = Cruise(JOYSTICK, 0.3)
-    record_in_a_copy(cruise.world, lambda: _go_wrong(cruise, "velocity_dies"), path)
-    return path
 
 
 def replay(*arguments: object) -> tuple[int, str]:
@@ -207,6 +157,21 @@ def test_another_robot_yaml_is_compared(recorded: Path, tmp_path: Path) -> None:
     code, output = replay(recorded, "--config", file)
     assert code == 0
     assert "earlier: timeouts.lease_s" in output
+
+
+def test_without_the_files_of_the_parts_it_cannot_tell_what_they_decided(recorded: Path, tmp_path: Path) -> None:
+    for suffix in (".asc", ".json"):
+        (tmp_path / f"alone{suffix}").write_bytes(recorded.with_suffix(suffix).read_bytes())
+    code, output = replay(tmp_path / "alone.asc")
+    assert code == 0
+    assert "watchdog: cannot tell, since its file" in output
+    assert "mux and filter: cannot tell, since their file" in output
+    assert "setpoints differ by at most" in output
+    told = json.loads(replay(tmp_path / "alone.asc", "--json")[1])
+    assert ("watchdog" in told, "velocity" in told, len(told["not_replayed"])) == (False, False, 2)
+    other = tmp_path / "other.yaml"
+    other.write_text(json.dumps(json.loads((tmp_path / "alone.json").read_text())["robot_yaml"]))
+    assert "with the other robot.yaml:\n  driver: " in replay(tmp_path / "alone.asc", "--config", other)[1]
 
 
 @pytest.mark.parametrize(

@@ -142,12 +142,6 @@ def test_the_command_tells_what_another_robot_changes(folder: Path, tmp_path: Pa
     assert "replayed LIMIT speed_ceiling, 0.200 m/s" in output
 
 
-def test_without_that_file_the_command_cannot_tell_about_the_filter(folder: Path, tmp_path: Path) -> None:
-    for suffix in (".asc", ".json"):
-        (tmp_path / f"alone{suffix}").write_bytes((folder / "estop" / f"estop{suffix}").read_bytes())
-    assert "safety filter: cannot tell" in run(tmp_path / "alone.asc")[1]
-
-
 BAD = "no input of mux or filter"
 
 

@@ -83,8 +83,8 @@ SHORT = (
     "restart driver",
     "reboot",
 )
-"""For a look of ten minutes: what only services of systemd and a real adapter show. The other ways to end are in the exit
-matrix too; the longest (freeze, upgrade, two robots, the serial adapter's errors) run with all."""
+"""For a look of ten minutes: what only services of systemd and a real adapter show. The exit matrix has the other ways
+to end; the longest scenarios (freeze, upgrade, two robots, errors of the serial adapter) run with all."""
 GROUPS: dict[str, Sequence[str]] = {"first": tuple(FIRST), "second": tuple(SECOND), "short": SHORT}
 
 
