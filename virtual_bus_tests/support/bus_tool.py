@@ -68,10 +68,10 @@ def argv(*words: str) -> list[str]:
     return [sys.executable, "-m", "canbase_cli", *words]
 
 
-def canbase(*words: str, stdin: str | None = None, timeout_s: float = 50.0) -> subprocess.CompletedProcess[str]:
+def canbase(*words: str, timeout_s: float = 50.0) -> subprocess.CompletedProcess[str]:
     """A canbase command, run to its end."""
     return subprocess.run(
-        argv(*words), input=stdin or "", capture_output=True, text=True, env=ENVIRONMENT, timeout=timeout_s, check=False
+        argv(*words), input="", capture_output=True, text=True, env=ENVIRONMENT, timeout=timeout_s, check=False
     )
 
 
