@@ -15,6 +15,7 @@ import can
 import pytest
 
 from support.bus_tool import ENVIRONMENT, argv, write_robot
+from support.command_world import canbase
 from support.udp_port import free_udp_port
 
 pytestmark = [pytest.mark.bus, pytest.mark.timeout(60)]
@@ -69,45 +70,11 @@ def bench(tmp_path: Path) -> Iterator[tuple[Path, can.BusABC]]:
         yield write_robot(tmp_path, port), bus
 
 
-def test_frames_in_words_until_ctrl_c(bench: tuple[Path, can.BusABC]) -> None:
-    config, bus = bench
-    with dumping(config) as process:
-        lines_until(process, bus, "node 2 (right_wheel): EMCY 3220h under-voltage of the DC link, register 04h")
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=20.0)
-        assert (process.returncode, err) == (0, "")
-    assert "node 1 (left_wheel): TPDO1 statusword 0637h operation enabled, position 7" in out
-    assert "NMT start, all nodes" in out
-
-
-def test_only_what_is_asked_for(bench: tuple[Path, can.BusABC]) -> None:
-    config, bus = bench
-    with dumping(config, "--node", "2", "--kind", "pdo") as process:
-        lines = lines_until(process, bus, "TPDO1 statusword 0208h fault, position 9")
-    assert all("node 2 (right_wheel): TPDO1" in line for line in lines)
-
-
-def test_a_reader_that_has_enough_is_no_error(bench: tuple[Path, can.BusABC]) -> None:
-    """As with `canbase bus dump | head -1`."""
-    config, bus = bench
-    with dumping(config) as process:
-        assert process.stdout is not None
-        lines_until(process, bus, "")
-        process.stdout.close()
-        end = time.monotonic() + 20.0
-        while process.poll() is None and time.monotonic() < end:
-            bus.send(can.Message(arbitration_id=0x080, is_extended_id=False))
-            time.sleep(TURN_S)
-        assert process.returncode == 0
-        assert process.stderr is not None
-        assert process.stderr.read() == ""
-
-
-def test_it_sends_nothing(bench: tuple[Path, can.BusABC]) -> None:
+def test_frames_in_words_until_ctrl_c_and_it_sends_nothing(bench: tuple[Path, can.BusABC]) -> None:
     config, bus = bench
     sent = 0
     with dumping(config) as process:
-        lines_until(process, bus, "operation enabled, position 7")
+        lines_until(process, bus, "node 2 (right_wheel): EMCY 3220h under-voltage of the DC link, register 04h")
         while bus.recv(0.2) is not None:
             pass
         for _ in range(20):
@@ -117,11 +84,33 @@ def test_it_sends_nothing(bench: tuple[Path, can.BusABC]) -> None:
         seen = 0
         while bus.recv(0.5) is not None:  # each sender hears itself, and whoever else sends
             seen += 1
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20.0)
+        assert (process.returncode, err) == (0, "")
+    assert "node 1 (left_wheel): TPDO1 statusword 0637h operation enabled, position 7" in out
+    assert "NMT start, all nodes" in out
     assert seen <= sent
 
 
+def test_only_what_is_asked_for_and_a_reader_that_has_enough_is_no_error(bench: tuple[Path, can.BusABC]) -> None:
+    """As with `canbase bus dump | head`."""
+    config, bus = bench
+    with dumping(config, "--node", "2", "--kind", "pdo") as process:
+        lines = lines_until(process, bus, "TPDO1 statusword 0208h fault, position 9")
+        assert all("node 2 (right_wheel): TPDO1" in line for line in lines)
+        assert process.stdout is not None
+        process.stdout.close()
+        end = time.monotonic() + 20.0
+        while process.poll() is None and time.monotonic() < end:
+            for cob_id, data in FRAMES:
+                bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+            time.sleep(TURN_S)
+        assert process.returncode == 0
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+
+
 def test_a_bus_that_cannot_be_opened_is_1_with_its_reason() -> None:
-    command = argv("bus", "dump", "--interface", "socketcan", "--channel", "nocan7")
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=50.0, check=False)
-    assert done.returncode == 1
+    done = canbase("bus", "dump", "--interface", "socketcan", "--channel", "nocan7")
+    assert done.exit_code == 1
     assert "socketcan nocan7 cannot be opened" in done.stderr
