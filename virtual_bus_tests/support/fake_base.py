@@ -1,11 +1,13 @@
 """A base for tests of the action server: obeys cmd_vel_action with a ramp, publishes odom and the states of all nodes.
 
-Everything that can go wrong is a field. It lives in the test's own node and moves only while that node spins.
+Everything that can go wrong is a field. It has a node and a thread: a test whose clients have much to do, or that waits
+for a process, holds no message of the base up. Change what `_step` changes as well (x_m, yaw_rad) with `lock` held.
 """
 
 from __future__ import annotations
 
 import math
+import threading
 import time
 from pathlib import Path
 
@@ -13,13 +15,15 @@ from builtin_interfaces.msg import Time
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from support.ros_harness import TestNode
 
 PERIOD_S = 0.02
 LONGEST_STEP_S = 2 * PERIOD_S
-"""A test that the computer holds up holds its base up too: nobody could have stopped it meanwhile."""
+"""A base that the computer holds up stands meanwhile: nobody could have stopped it."""
 RAMP_MPS2 = 1.0
 COMMAND_TIMEOUT_S = 0.3
 
@@ -37,7 +41,8 @@ class FakeBase:
         self._turn_radps = 0.0
         self._wanted = TwistStamped()
         self._last = time.monotonic()
-        node = test_node.node
+        self.lock = threading.Lock()
+        self._node = node = Node("fake_base", context=test_node.context, enable_rosout=False)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._odom = node.create_publisher(Odometry, "odom", 10)
         self._driver = node.create_publisher(DriverStatus, "motor_driver/status", 1)
@@ -45,6 +50,16 @@ class FakeBase:
         self._mux = node.create_publisher(MuxState, "velocity_mux/state", latched)
         node.create_subscription(TwistStamped, "cmd_vel_action", self._on_order, 10)
         node.create_timer(PERIOD_S, self._step)
+        self._executor = SingleThreadedExecutor(context=test_node.context)
+        self._executor.add_node(node)
+        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+        self._thread.start()
+        test_node.ends.callback(self._end)
+
+    def _end(self) -> None:
+        self._executor.shutdown()
+        self._thread.join()
+        self._node.destroy_node()
 
     def heal(self) -> None:
         """Nothing is wrong from now on."""
@@ -64,6 +79,11 @@ class FakeBase:
         """Somebody listens to each of its topics."""
         return all(each.get_subscription_count() > 0 for each in (self._odom, self._driver, self._safety, self._mux))
 
+    @property
+    def fresh(self) -> bool:
+        """It obeys its last order still."""
+        return bool(self.orders) and time.monotonic() - self.orders[-1][0] < COMMAND_TIMEOUT_S
+
     def orders_since(self, start_s: float) -> list[float]:
         """Linear velocities ordered after start_s (time.monotonic)."""
         return [mps for at_s, mps in self.orders if at_s >= start_s]
@@ -73,10 +93,14 @@ class FakeBase:
         self.orders.append((time.monotonic(), message.twist.linear.x))
 
     def _step(self) -> None:
+        with self.lock:
+            self._move()
+            self._publish()
+
+    def _move(self) -> None:
         now_s = time.monotonic()
         elapsed_s, self._last = min(now_s - self._last, LONGEST_STEP_S), now_s
-        fresh = bool(self.orders) and now_s - self.orders[-1][0] < COMMAND_TIMEOUT_S
-        held = self.safety.action == SafetyState.STOP or self.driver.state != DriverStatus.ENABLED or not fresh
+        held = self.safety.action == SafetyState.STOP or self.driver.state != DriverStatus.ENABLED or not self.fresh
         wanted_mps = 0.0 if held else self._wanted.twist.linear.x
         self._turn_radps = 0.0 if held else self._wanted.twist.angular.z
         most = self.ramp_mps2 * elapsed_s
@@ -86,7 +110,6 @@ class FakeBase:
         self.yaw_rad += self._turn_radps * elapsed_s
         self.x_m += self.speed_mps * elapsed_s * math.cos(self.yaw_rad)
         self.y_m += self.speed_mps * elapsed_s * math.sin(self.yaw_rad)
-        self._publish()
 
     def _publish(self) -> None:
         odometry = Odometry(child_frame_id="base_link")

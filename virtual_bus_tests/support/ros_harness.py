@@ -178,6 +178,8 @@ class TestNode:
         self.node = Node(name, namespace=namespace, context=self.context, enable_rosout=False)
         self._played: dict[str, Node] = {}
         self._sources: dict[str, Repeater[Any]] = {}
+        self.ends = contextlib.ExitStack()
+        """What ends before this node."""
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
 
@@ -251,6 +253,7 @@ class TestNode:
 
     def close(self) -> None:
         """Leaves the ROS graph."""
+        self.ends.close()
         self.executor.shutdown()
         for node in (self.node, *self._played.values()):
             node.destroy_node()
