@@ -70,12 +70,21 @@ def test_neither_do_its_processes_whatever_the_python(trap: Path, version: tuple
     assert done.stdout.strip()
 
 
-@pytest.mark.parametrize("python_path", [":", ":/nowhere", "/nowhere:", ".", "/nowhere::/nowhere2"])
-def test_an_empty_entry_of_the_search_path_is_not_the_current_folder(trap: Path, python_path: str) -> None:
+def test_an_empty_entry_of_the_search_path_is_not_the_current_folder(trap: Path) -> None:
     """Of `export PYTHONPATH=$PYTHONPATH:/my/folder` where nothing was in it before."""
-    done = run(sys.executable, "-m", "canbase_cli", "config", "check", str(sample("bench")), PYTHONPATH=python_path)
+    done = run(sys.executable, "-m", "canbase_cli", "config", "check", str(sample("bench")), PYTHONPATH=":/nowhere")
 
     assert (done.returncode, caught(trap)) == (0, ""), done.stderr
+
+
+@pytest.mark.parametrize("python_path", [":", ":/nowhere", "/nowhere:", ".", "/nowhere::/nowhere2"])
+def test_neither_is_one_anywhere_in_it_nor_a_relative_one(trap: Path, python_path: str) -> None:
+    path, environment = ["/opt/lib", str(trap)], {"PYTHONPATH": python_path}
+
+    forget_current_folder(path, ["/opt/bin/canbase"], environment)
+
+    assert path == ["/opt/lib"]
+    assert environment["PYTHONPATH"] == python_path.strip(":.").replace("::", ":")
 
 
 def test_a_part_of_the_stack_and_what_it_becomes_import_nothing_from_there(trap: Path) -> None:

@@ -26,14 +26,13 @@ def ticks(shown: Any) -> str:
     return str(shown.locator("#overview .xtick").last.text_content())
 
 
-@pytest.mark.parametrize(("width", "height", "dark"), [(1100, 1000, False), (420, 900, True)])
-def test_plots_choices_and_tables(width: int, height: int, dark: bool, tmp_path: Path) -> None:
+def test_plots_choices_and_tables_on_a_screen_and_on_a_dark_phone(tmp_path: Path) -> None:
     report = made(passed())
     file = tmp_path / "report.html"
     file.write_text(page("canbase prove qualify: bench", report, sections(report)), encoding="utf-8")
     with browser() as player:
-        shown, complaints = offline_page(player, file, DRAWN, width=width, height=height, dark=dark)
-        assert shown.evaluate("document.documentElement.scrollWidth") <= width
+        shown, complaints = offline_page(player, file, DRAWN, width=1100, height=1000, dark=False)
+        assert shown.evaluate("document.documentElement.scrollWidth") <= 1100
         assert shown.locator(".verdict").inner_text().startswith("No violation in 1,135 stops")
         assert shown.locator("#overview .scatterlayer .trace").count() == 5
         assert "estop pressed" in shown.locator("#overview").text_content()
@@ -47,6 +46,11 @@ def test_plots_choices_and_tables(width: int, height: int, dark: bool, tmp_path:
         assert "estop pressed, 100 runs" in shown.locator("#curve").text_content()
         rows = shown.locator("#stops tbody tr")
         assert rows.count() == 5
+        shown.emulate_media(color_scheme="dark")
+        shown.set_viewport_size({"width": 420, "height": 900})
+        shown.reload()
+        shown.wait_for_selector(DRAWN)
+        assert shown.evaluate("document.documentElement.scrollWidth") <= 420
         assert [text for text in complaints if not text.startswith(("data:", "blob:"))] == []
 
 
