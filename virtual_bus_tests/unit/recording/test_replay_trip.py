@@ -32,6 +32,11 @@ CASES = {
     "watchdog_hangs": TripCause.LOOP_LATE,
     "watchdog_bus_problem": TripCause.BUS_FAILED,
     "watchdog_dies": TripCause.POWER_AT_END,
+    "drive_silent": TripCause.DRIVE_SILENT,
+    "encoder_lost": TripCause.FEEDBACK_IMPLAUSIBLE,
+    "encoder_reversed": TripCause.MOTION_OUTSIDE,
+    "second_master_nmt": TripCause.FOREIGN_MASTER,
+    "second_master_setpoints": TripCause.TARGET_OUTSIDE,
     "is requested to end": TripCause.ENDED,
 }
 """Faults of the campaign, of a robot that drives at 0.3 m/s. Four of them no other process can know of."""
