@@ -17,9 +17,11 @@ from support.real_bus import crews
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Each test with a `crew` runs once for each of them."""
+    """Each test with a `crew` runs once for each of them, or for the last of them: mark `one_crew`."""
     if "crew" in metafunc.fixturenames:
-        metafunc.parametrize("crew", crews(metafunc.config), ids=lambda crew: crew.name)
+        all_of_them = crews(metafunc.config)
+        wanted = all_of_them[-1:] if metafunc.definition.get_closest_marker("one_crew") else all_of_them
+        metafunc.parametrize("crew", wanted, ids=lambda crew: crew.name)
 
 
 @pytest.fixture

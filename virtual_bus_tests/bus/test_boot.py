@@ -69,6 +69,7 @@ def canopen_node(channel: str) -> Iterator[canopen.LocalNode]:
     """Node 1 of the library: an SDO server and NMT slave that is not ours. It does not boot up anew by itself."""
     with open_bus(channel) as bus:
         network = canopen.Network(bus)
+        network.NOTIFIER_CYCLE = 0.05  # it looks so often whether it is to end
         network.connect()
         node = network.create_node(1, EDS)
 

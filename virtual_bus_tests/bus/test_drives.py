@@ -94,6 +94,7 @@ def test_cycles_keep_their_grid_and_snapshots_come_at_the_rate_of_the_odometry(d
     assert last.cycle.lateness_max_s >= 0.0
 
 
+@pytest.mark.one_crew
 def test_the_fault_of_one_drive_and_the_battery_of_all_stop_the_base_until_a_reset(
     crew: Crew, driver: Driver, around: Surroundings
 ) -> None:
@@ -123,6 +124,7 @@ def test_the_fault_of_one_drive_and_the_battery_of_all_stop_the_base_until_a_res
     driver.order(driver.forward, 5.0, at_speed_and_right)
 
 
+@pytest.mark.one_crew
 def test_frames_of_29_bits_that_look_like_the_drives_own_change_nothing(
     crew: Crew, driver: Driver, around: Surroundings
 ) -> None:
@@ -134,6 +136,7 @@ def test_frames_of_29_bits_that_look_like_the_drives_own_change_nothing(
     assert driven.odometry.pose.x_m == pytest.approx(around.truth.x_m, abs=0.03)
 
 
+@pytest.mark.one_crew
 def test_a_defect_in_the_core_sends_quick_stops_ends_the_thread_and_is_kept(
     crew: Crew, driver: Driver, around: Surroundings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

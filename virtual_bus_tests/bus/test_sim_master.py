@@ -26,6 +26,8 @@ from support.sim_rig import MPS, robot
 pytestmark = pytest.mark.bus
 
 EDS = str(files("canbase_config").joinpath("eds/canbase_cia402.eds"))
+CYCLE_S = 0.05
+"""It looks so often whether it is to end [s]."""
 ENABLED, QUICK_STOP, SOD = 0x27, 0x07, 0x40
 
 
@@ -36,6 +38,7 @@ class Master:
 
     def __init__(self, channel: str) -> None:
         self.network = canopen.Network()
+        self.network.NOTIFIER_CYCLE = CYCLE_S
         self.nodes = [self.network.add_node(node_id, EDS) for node_id in (1, 2)]
         self.left, self.right = self.nodes
         self.booted: set[int] = set()
