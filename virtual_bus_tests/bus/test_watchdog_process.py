@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.frames import Frame
 from support.ros_harness import clear_records
 from support.watchdog_story import config
@@ -21,6 +22,8 @@ from unit.runtime.test_output import full_pipe
 
 pytestmark = pytest.mark.bus
 
+NOT_A_CONFIGURATION = (TypeError, ValueError, KeyError, AttributeError)
+"""What main.py takes for one."""
 QUICK_STOP = Frame(0x501, bytes.fromhex("02 00"))
 
 
@@ -64,12 +67,18 @@ def test_asked_to_end_at_speed_it_stops_first_and_then_ends_well(watched: Watche
     watched.robot.wait_until_still(timeout_s=0.1)
 
 
-def test_asked_to_end_at_rest_it_just_ends(watched: Watched) -> None:
+def test_systemd_is_told_ready_alive_and_the_state_and_asked_to_end_at_rest_it_just_ends(watched: Watched) -> None:
+    time.sleep(1.0)
+    lines = watched.notified()
+    assert lines[0] == "READY=1"
+    assert "STATUS=watching" in lines
+    assert 3 <= lines.count("WATCHDOG=1") <= 8
     begin = time.monotonic()
     code, log = watched.end(signal.SIGTERM)
     assert (code, "tripped" in log) == (0, False)
     assert [frame for at, frame in watched.robot.heard if at > begin and frame.cob_id == 0x501] == []
     assert not Path(watched.config.lease_socket).exists()
+    assert "STOPPING=1" in watched.notified()
 
 
 def test_stopped_and_continued_at_speed_it_trips_because_it_was_away(watched: Watched) -> None:
@@ -99,16 +108,6 @@ def test_a_log_that_nobody_reads_does_not_hold_up_the_stop(tmp_path: Path) -> No
             it.process.kill()
             it.process.communicate()
             it.systemd.close()
-
-
-def test_systemd_is_told_ready_alive_and_the_state(watched: Watched) -> None:
-    time.sleep(1.0)
-    lines = watched.notified()
-    assert lines[0] == "READY=1"
-    assert "STATUS=watching" in lines
-    assert 3 <= lines.count("WATCHDOG=1") <= 8
-    watched.end(signal.SIGTERM)
-    assert "STOPPING=1" in watched.notified()
 
 
 def test_a_second_watchdog_on_the_same_bus_leaves_the_first_alone(watched: Watched) -> None:
@@ -141,11 +140,6 @@ def test_a_watchdog_that_hears_another_one_never_sends(watched: Watched) -> None
 # --- starting badly
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "canbase_watchdog", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
-
-
 def test_a_bus_that_cannot_be_opened_is_waited_for_until_the_end(tmp_path: Path) -> None:
     bad = replace(config(), bus_arguments={"interface": "nonsense"}, lease_socket=str(tmp_path / "lease"))
     command = [sys.executable, "-m", "canbase_watchdog", "--config-json", bad.to_json()]
@@ -160,8 +154,14 @@ def test_a_bus_that_cannot_be_opened_is_waited_for_until_the_end(tmp_path: Path)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"drives": []}', '{"drives": [1]}'])
-def test_a_configuration_that_is_none(text: str) -> None:
-    done = run("--config-json", text)
+def test_what_is_no_configuration_is_none(text: str) -> None:
+    with pytest.raises(NOT_A_CONFIGURATION):
+        WatchdogConfig.from_json(text)
+
+
+def test_without_a_configuration_it_is_2() -> None:
+    command = [sys.executable, "-m", "canbase_watchdog", "--config-json", '{"drives": [1]}']
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert (done.returncode, "no watchdog configuration" in done.stderr) == (2, True)
     assert "Traceback" not in done.stderr
 
