@@ -26,26 +26,22 @@ def robots() -> Iterator[Pair]:
         yield {"robot1": one, "robot2": two}
 
 
-BOTH_WAYS = pytest.mark.parametrize(("name", "other"), [("robot1", "robot2"), ("robot2", "robot1")])
-
-
-@BOTH_WAYS
-def test_a_goal_moves_the_robot_of_its_namespace_alone(robots: Pair, name: str, other: str) -> None:
-    driven, idle = robots[name], robots[other]
+def test_a_goal_moves_the_robot_of_its_namespace_alone(robots: Pair) -> None:
+    driven, idle = robots["robot1"], robots["robot2"]
     orders = idle.node.record(TwistStamped, "cmd_vel")
     before, idle_odometry, began_s = driven.truth(), idle.odometry(), time.monotonic()
-    command = driven.command("drive", "0.3", "--speed", "0.1", "--namespace", name)  # two robots load the computer
+    words = ("drive", "0.15", "--speed", "0.1", "--namespace", "robot1")  # slow: two robots load the computer
+    command = driven.command(*words)
     assert driven.exit_code(command) == 0, command.log()
-    assert driven.truth().travel_m - before.travel_m == pytest.approx(0.3, abs=0.010)
+    assert driven.truth().travel_m - before.travel_m == pytest.approx(0.15, abs=0.010)
     assert idle.moved_since(began_s, 1.0) < RESTS_M
     assert idle.odometry() == pytest.approx(idle_odometry, abs=RESTS_M)
     idle.node.wait_for(lambda: orders.messages, 10.0, "orders to the idle robot")
     assert all(order.twist.linear.x == 0.0 for order in orders.messages)
 
 
-@BOTH_WAYS
-def test_a_joystick_moves_the_robot_of_its_namespace_alone(robots: Pair, name: str, other: str) -> None:
-    driven, idle = robots[name], robots[other]
+def test_a_joystick_moves_the_robot_of_its_namespace_alone(robots: Pair) -> None:
+    driven, idle = robots["robot2"], robots["robot1"]
     joystick = driven.node.source()
     began_s = time.monotonic()
     joystick.message = TwistStamped()
@@ -61,8 +57,8 @@ def test_a_latched_stop_of_one_leaves_the_other_alone(robots: Pair) -> None:
     one, two = robots["robot1"], robots["robot2"]
     assert one.run("stop") == 0
     one.wait_state(DriverStatus.LATCHED)
-    assert two.run("drive", "0.1", "--speed", "0.2") == 0
-    one.make_ready()
+    assert two.driven(0.05, 0.1)
+    assert one.wait_any_state().state == DriverStatus.LATCHED
 
 
 def test_no_topic_of_a_robot_is_outside_its_namespace(robots: Pair) -> None:

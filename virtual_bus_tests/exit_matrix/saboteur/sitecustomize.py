@@ -111,22 +111,6 @@ def withhold_odometry() -> None:
     MotorDriverNode.publish = publish  # type: ignore[method-assign]
 
 
-def freeze_odometry() -> None:
-    """The driver works, and the pose of its odometry stays where it is; the velocities are true."""
-    from canbase_driver.ros.node import MotorDriverNode
-
-    usual = MotorDriverNode.publish
-    frozen: list[DriverSnapshot] = []
-
-    def publish(self: MotorDriverNode, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
-        first = (frozen or [snapshot])[0]
-        frozen[:] = [first]
-        pose = first.odometry.pose
-        usual(self, replace(snapshot, odometry=replace(snapshot.odometry, pose=pose)), stops)
-
-    MotorDriverNode.publish = publish  # type: ignore[method-assign]
-
-
 ORDERS: Mapping[str, Callable[[], None]] = {
     order.__name__: order
     for order in (
@@ -137,7 +121,6 @@ ORDERS: Mapping[str, Callable[[], None]] = {
         repeat_setpoints,
         ignore_zero,
         withhold_odometry,
-        freeze_odometry,
     )
 }
 
