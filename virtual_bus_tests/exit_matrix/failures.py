@@ -34,6 +34,15 @@ DRIVER, VELOCITY, WATCHDOG, SERVER = "driver", "velocity", "watchdog", "action-s
 BEHIND_FILTER = ("motor_driver", "watchdog", "drives")
 BROKEN = 1
 """Exit code after a defect."""
+COMMON = (
+    (DRIVER, "SIGKILL"),
+    (DRIVER, "SIGSTOP"),
+    (VELOCITY, "SIGKILL"),
+    (WATCHDOG, "SIGSTOP"),
+    (SERVER, "SIGSTOP"),
+)
+"""Processes that `make test` kills and stops in a row of the matrix. It stops the velocity process in
+ros/test_velocity_hang.py, kills the server in ros/test_up.py, and the watchdog in the virtual robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +104,7 @@ def _of_process(what: str, part: str, how: str, caught_by: tuple[Layer, ...], ho
         ended=None if exit_code is None or part == CLIENT else (part, exit_code),
         starves=part if how == "busy loop" else "",
         holds=holds,
-        common=how in ("SIGKILL", "SIGSTOP") and part != CLIENT,
+        common=(part, how) in COMMON,
     )
 
 

@@ -4,7 +4,7 @@ SPEED ────────╮ failure                    ╭┄┄ the joyst
 0     ────────╰────── stands ── QUIET_S ───┴── undo ── QUIET_S ── reset ── the next row drives
               │←time→│  by the simulator's ground truth; the limit by the layer that caught it (`layers.py`)
 
-Where driver, watchdog or drives hold the stop, somebody orders motion on cmd_vel too, until after `undo`.
+Where driver, watchdog or drives hold the stop, somebody orders motion on cmd_vel as well, until after `undo`.
 """
 
 from __future__ import annotations
@@ -139,12 +139,11 @@ class Runner:
         return Result(row, tuple((layer.who, layer.cause) for layer in caught), stop, limit_s, problem)
 
     def _check_rest_of(self, row: Row, scene: Scene) -> None:
-        if row.holds:
-            scene.push(SPEED_MPS)
-            _check_rest(scene, "when a joystick ordered it")
         if row.latched_behind_filter:
             scene.push_straight(SPEED_MPS)
-            _check_rest(scene, "when somebody ordered it on cmd_vel")
+        if row.holds:
+            scene.push(SPEED_MPS)
+            _check_rest(scene, "when a joystick ordered it, or somebody on cmd_vel")
         scene.joystick.message = None
         _check_end(row, scene)
         row.undo(scene)

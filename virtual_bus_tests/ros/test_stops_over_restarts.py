@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Iterator
 
 import pytest
 from canbase.msg import DriverStatus
@@ -13,6 +14,13 @@ from support.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(200)]
 
 QUIET_S = 2.0
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[RunningRobot]:
+    """The robot of all tests, in their order; each leaves it enabled."""
+    with own_domain() as domain, robot_on(domain) as running:
+        yield running
 
 
 def kill(robot: RunningRobot, *parts: str) -> None:
@@ -34,36 +42,28 @@ def stays_latched(robot: RunningRobot, cause: str) -> None:
     assert cause in f"{status.cause}: {status.detail}", status
     assert all(each.state == DriverStatus.LATCHED for each in robot.status.since(began_s))
     robot.make_ready()
-    robot.wait_whole()  # goals wait until DDS has given up what was killed
 
 
-# `canbase stop` ── SIGKILL of the driver ── start: still latched ── reset ── drives
-def test_a_stop_outlives_its_driver_and_a_reboot() -> None:
-    with own_domain() as domain, robot_on(domain) as robot:
-        assert robot.run("stop") == 0
-        robot.wait_state(DriverStatus.LATCHED)
-        kill(robot, "driver")
-        stays_latched(robot, "latched since before the start: service motor_driver/stop")
-        assert robot.run("stop") == 0
-        robot.wait_state(DriverStatus.LATCHED)
-        kill(robot, "driver", "watchdog", "velocity", "action-server")
-        stays_latched(robot, "latched since before the start: service motor_driver/stop")
+# driving ── SIGKILL of driver and watchdog at once ── start: latched ── reset ── power
+def test_driver_and_watchdog_killed_with_power_come_back_latched(robot: RunningRobot) -> None:
+    robot.goal(4.0, 0.3)
+    robot.wait_speed(0.29)
+    kill(robot, "driver", "watchdog")
+    stays_latched(robot, "it ended while there was power")
 
 
-# driving ── SIGKILL of driver and watchdog at once ── start: latched ── reset ── drives
-def test_driver_and_watchdog_killed_with_power_come_back_latched() -> None:
-    with own_domain() as domain, robot_on(domain) as robot:
-        robot.goal(4.0, 0.3)
-        robot.wait_speed(0.29)
-        kill(robot, "driver", "watchdog")
-        stays_latched(robot, "it ended while there was power")
+# `canbase stop` ── SIGKILL of all, as in a reboot ── start: still latched ── reset ── power
+def test_a_stop_outlives_its_driver_and_a_reboot(robot: RunningRobot) -> None:
+    assert robot.run("stop") == 0
+    robot.wait_state(DriverStatus.LATCHED)
+    kill(robot, "driver", "watchdog", "velocity", "action-server")
+    stays_latched(robot, "latched since before the start: service motor_driver/stop")
 
 
-# SIGTERM in order ── start ── drives, without a reset
-def test_an_orderly_end_leaves_nothing_latched() -> None:
-    with own_domain() as domain, robot_on(domain) as robot:
-        assert set(robot.stack.stop().values()) == {0}
-        robot.status.clear()
-        robot.stack.start()
-        robot.wait_enabled()
-        assert all(status.state != DriverStatus.LATCHED for status in robot.status.messages)
+# SIGTERM in order ── start ── power, without a reset
+def test_an_orderly_end_leaves_nothing_latched(robot: RunningRobot) -> None:
+    assert set(robot.stack.stop().values()) == {0}
+    robot.status.clear()
+    robot.stack.start()
+    robot.wait_enabled()
+    assert all(status.state != DriverStatus.LATCHED for status in robot.status.messages)
