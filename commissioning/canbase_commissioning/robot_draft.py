@@ -48,8 +48,18 @@ class Wheel:
 
 
 @dataclass(frozen=True, slots=True)
+class Scanner:
+    """Where a laser scanner is in base_link: ahead and left [m], its zero beam turned to the left [degrees]."""
+
+    x_m: float
+    y_m: float
+    yaw_deg: float
+    upside_down: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Draft:
-    """What a robot.yaml needs, in metres and m/s. `has_scanner`, `has_estop`: nothing moves without their messages."""
+    """What a robot.yaml needs, in metres and m/s. `scanner`, `has_estop`: nothing moves without their messages."""
 
     name: str
     wheels: tuple[Wheel, ...]
@@ -59,7 +69,7 @@ class Draft:
     rear_m: float
     half_width_m: float
     linear_mps: float
-    has_scanner: bool
+    scanner: Scanner | None
     has_estop: bool
 
 
@@ -85,9 +95,7 @@ def ask_about(axes: Sequence[FoundAxis]) -> Questions:
     rear_m = yield _ask("rear_m", "From there to the rear edge [m]", edge, "0.3")
     half_m = yield _ask("half_width_m", "From there to the left or right edge [m]", edge, f"{track_m / 2 + 0.05:.3g}")
     speed_mps = yield _ask("linear_mps", "Greatest speed [m/s]; begin low", number(0.02, 5.0), "0.3")
-    scanner = yield _ask("scanner", "Does a laser scanner publish on scan (yes, no)?", _yes_or_no, "yes")
-    if not scanner:
-        yield Tell("without a scanner no obstacle stops the robot", is_loud=True)
+    scanner = yield from _ask_about_scanner()
     estop = yield _ask("estop", "Does a node publish the emergency stop on estop_state (yes, no)?", _yes_or_no, "yes")
     if not estop:
         yield Tell("without estop_state an emergency stop is noticed when the drives lose power", is_loud=True)
@@ -100,9 +108,24 @@ def ask_about(axes: Sequence[FoundAxis]) -> Questions:
         rear_m=rear_m,
         half_width_m=half_m,
         linear_mps=speed_mps,
-        has_scanner=scanner,
+        scanner=scanner,
         has_estop=estop,
     )
+
+
+def _ask_about_scanner() -> Generator[Ask | Tell, Any, Scanner | None]:
+    """A pose that is wrong moves every obstacle by as much: how far ahead it is has no proposed answer."""
+    if not (yield _ask("scanner", "Does a laser scanner publish on scan (yes, no)?", _yes_or_no, "yes")):
+        yield Tell("without a scanner no obstacle stops the robot", is_loud=True)
+        return None
+    where = number(-5.0, 5.0)
+    text = "Scanner ahead of the middle between the wheels [m]; behind: negative"
+    x_m = yield _ask("scanner.x_m", text, where)
+    y_m = yield _ask("scanner.y_m", "Scanner to the left of it [m]; right: negative", where, "0")
+    text = "Its zero beam, turned to the left from straight ahead [degrees]; to the right: negative"
+    yaw_deg = yield _ask("scanner.yaw_deg", text, number(-360.0, 360.0), "0")
+    upside_down = yield _ask("scanner.upside_down", "Is it mounted upside down (yes, no)?", _yes_or_no, "no")
+    return Scanner(x_m, y_m, yaw_deg, upside_down)
 
 
 def _ask_about_wheel(axis: FoundAxis, side: Side) -> Generator[Ask | Tell, Any, list[Wheel]]:
@@ -178,11 +201,20 @@ def robot_yaml(sample: str, draft: Draft, bus: Bus) -> str:
         (("safety", "footprint", "rear_m"), draft.rear_m),
         (("safety", "footprint", "left_m"), draft.half_width_m),
         (("safety", "footprint", "right_m"), draft.half_width_m),
-        (("safety", "scan", "required"), draft.has_scanner),
+        (("safety", "scan", "required"), draft.scanner is not None),
+        *_scanner_values(draft.scanner),
         (("safety", "estop", "required"), draft.has_estop),
     ]
     text = f"{before}{drives}{_drives(draft.wheels)}{after}"
     return edited(text, [Edit(loc, None, value) for loc, value in values])
+
+
+def _scanner_values(scanner: Scanner | None) -> list[tuple[tuple[str, ...], Any]]:
+    if scanner is None:
+        return []
+    values = {"x_m": scanner.x_m, "y_m": scanner.y_m, "yaw_rad": float(f"{math.radians(scanner.yaw_deg):.6g}")}
+    upside_down = {"upside_down": True} if scanner.upside_down else {}
+    return [(("safety", "scan", key), value) for key, value in (values | upside_down).items()]
 
 
 def _around_drives(sample: str) -> tuple[str, str, str]:

@@ -16,8 +16,8 @@ from canbase_config.profile_file import profile_names
 from canbase_config.robot import Bus
 
 CAN0 = Bus(interface="socketcan", channel="can0", bitrate=250_000, extra={})
-FRESH = {"gear_ratio": "20", "counts_per_motor_rev": "4096", "velocity_unit": "rpm"}
-"""What a person knows of a drive that reports nothing."""
+FRESH = {"gear_ratio": "20", "counts_per_motor_rev": "4096", "velocity_unit": "rpm", "scanner.x_m": "0.3"}
+"""What a person knows of drives that report nothing, and of the scanner."""
 
 
 def answer(axes: list[FoundAxis], given: Mapping[str, str] = FRESH) -> tuple[Draft, list[str]]:
@@ -54,7 +54,7 @@ def two(profile: str = "generic", **found: float) -> list[FoundAxis]:
 
 
 def test_the_proposed_answers_make_a_robot_that_passes_the_check(tmp_path: Path) -> None:
-    draft, told = answer(two(counts_per_motor_rev=4096, gear_ratio=20.0), {})
+    draft, told = answer(two(counts_per_motor_rev=4096, gear_ratio=20.0), {"scanner.x_m": "0.3"})
     robot = loaded(tmp_path, draft).robot
     assert told == []
     assert [(d.joint, d.node_id, d.axis, d.side, d.direction) for d in robot.drives] == [
@@ -116,6 +116,17 @@ def test_what_is_missing_to_stop_the_robot_is_told_and_written(tmp_path: Path) -
     assert ["scanner" in line or "emergency stop" in line for line in told] == [True, True]
 
 
+@pytest.mark.parametrize("name", ["example_can0", "bench"])
+def test_the_pose_of_the_scanner_is_asked_and_none_of_the_sample_stays(tmp_path: Path, name: str) -> None:
+    pose = {"scanner.x_m": "-0.2", "scanner.y_m": "0.1", "scanner.yaw_deg": "180", "scanner.upside_down": "yes"}
+    draft, _ = answer(two(), FRESH | pose)
+    scan = loaded(tmp_path, draft, name=name).robot.safety.scan
+    assert (scan.x_m, scan.y_m, scan.upside_down) == (-0.2, 0.1, True)
+    assert scan.yaw_rad == pytest.approx(math.pi, abs=1e-5)
+    with pytest.raises(KeyError):  # nobody answers: nothing is assumed
+        answer(two(), {key: value for key, value in FRESH.items() if key != "scanner.x_m"})
+
+
 @pytest.mark.parametrize(("sides", "reason"), [(("left", "left"), "each side"), (("none", "right"), "each side")])
 def test_a_base_with_wheels_on_one_side_is_refused(sides: tuple[str, str], reason: str) -> None:
     with pytest.raises(CommissionError, match=reason):
@@ -134,6 +145,7 @@ def test_more_wheels_than_canbase_drives_are_refused() -> None:
         ("counts_per_motor_rev", "0"), ("counts_per_motor_rev", "40.5"), ("counts_per_motor_rev", "2147483648"),
         ("wheel_radius_m", "0.005"), ("wheel_radius_m", "nan"), ("track_m", "6"), ("front_m", "-1"),
         ("linear_mps", "5.1"), ("linear_mps", "0"), ("scanner", "perhaps"), ("estop", ""),
+        ("scanner.x_m", "6"), ("scanner.yaw_deg", "south"), ("scanner.upside_down", ""),
     ],
 )  # fmt: skip
 def test_an_answer_that_makes_no_sense_is_refused(key: str, text: str) -> None:
