@@ -6,9 +6,10 @@ from collections.abc import MutableMapping
 from typing import Final
 
 _VARIABLE: Final = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
-_FORMAT: Final = "{date_time_with_ms} {severity} {name}: {message}"
+_FORMAT: Final = "{time} {severity} {name}: {message}"
+"""Seconds since 1970: rcutils' {date_time_with_ms} loses the zeros of milliseconds below 100."""
 
 
-def readable_times(environment: MutableMapping[str, str]) -> None:
+def log_times(environment: MutableMapping[str, str]) -> None:
     """Changes the environment of this process, before ROS starts."""
     environment.setdefault(_VARIABLE, _FORMAT)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from canbase_cli.log_format import readable_times
+from canbase_cli.log_format import log_times
 from canbase_cli.middleware import prefer_udp, stay_on_this_computer, take_no_profile_from_here
 from canbase_runtime.terminal import FAILED, fail
 from canbase_runtime.wrong_start import WrongStartError
@@ -167,7 +167,7 @@ def ros_needed() -> Iterator[None]:
     stay_on_this_computer(os.environ)
     prefer_udp(os.environ)
     take_no_profile_from_here(os.environ)
-    readable_times(os.environ)
+    log_times(os.environ)
     sys.modules.setdefault(_GENERATOR, None)  # type: ignore[arg-type] # documented: its import fails
     try:
         yield

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -26,7 +27,7 @@ from canbase_cli.options import (
     ros_needed,
 )
 from canbase_cli.raise_priority import raise_priority
-from canbase_runtime.latch_file import latch_folder
+from canbase_runtime.latch_file import create_first, latch_folder
 from canbase_runtime.own_folder import replaced
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.single_instance import TakenError, bus_name, check
@@ -65,6 +66,7 @@ def driver(
     Arguments after --ros-args go to rclpy.
     """
     robot, arguments = _robot_named(config), ros_arguments(ctx, namespace)
+    clear_first_records(robot)
     claim = _claim(robot)
     with ros_needed():
         from canbase_driver.runtime.main import run
@@ -77,6 +79,17 @@ def driver(
 
     with right_start():
         raise typer.Exit(run(robot, arguments, claim, autostart, before_the_first_frame))
+
+
+def clear_first_records(robot: Robot, *, simulated: bool = False) -> None:
+    """Records of stops of a robot on a virtual bus, or with simulated drives, that has never run for this user.
+
+    Real drives begin latched: this user has no record of them, and another one, such as that of the services, may have
+    a stop in his. Where the records cannot be made, the parts start latched and report the reason.
+    """
+    if robot.bus.is_virtual or simulated:
+        with suppress(OSError):
+            create_first(latch_folder(os.environ, Path.home(), robot.name), robot.name)
 
 
 def _claim(robot: Robot) -> Claim:
@@ -154,6 +167,7 @@ def watchdog(
 
     robot = _robot_named(config)
     check_unused_ros_arguments(ctx)
+    clear_first_records(robot)
     leave_stop_file(robot, stop_file)
     if stop_file is None:
         _refuse_second_watchdog(robot)

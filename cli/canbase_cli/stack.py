@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -84,28 +84,10 @@ class Stack:
         return {part: process.pid for part, process in self._running.items()}
 
     def start(self) -> None:
-        """Starts the parts that do not run; they find each other by themselves, in whatever order they get ready.
-
-        Simulated drives that have never run here begin with clear records of stops. Real ones begin latched: this user
-        has no record of them, and another one, such as that of the services, may have a stop in his.
-        """
-        self._clear_first_records()
+        """Starts the parts that do not run; they find each other by themselves, in whatever order they get ready."""
         for part in self._parts:
             if part not in self._running:
                 self._running[part] = self._spawn(part)
-
-    def _clear_first_records(self) -> None:
-        from canbase_config.load import load_robot
-        from canbase_runtime.latch_file import create_first, latch_folder
-
-        robot = load_robot(self._config).robot
-        if "sim" not in self._parts and not robot.bus.is_virtual:
-            return
-        name = robot.name
-        folder = latch_folder(os.environ if self._env is None else self._env, Path.home(), name)
-        # Where they cannot be made, the parts start latched and report the reason.
-        with suppress(OSError):
-            create_first(folder, name)
 
     def death(self) -> Death | None:
         """The first part found that has ended, None while all run."""

@@ -14,6 +14,7 @@ import typer
 
 from canbase_cli.end_signals import end_signals
 from canbase_cli.options import BenchOption, ConfigOption, NamespaceOption, named, ros_arguments
+from canbase_cli.services import clear_first_records
 from canbase_cli.stack import POLL_S, Death, Stack
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.terminal import FAILED, colour, fail, load_config
@@ -43,6 +44,7 @@ def up(
     for_parts, for_readiness = ros_arguments(ctx, ""), ros_arguments(ctx, namespace)
     with_sim = loaded.robot.bus.interface == "udp_multicast" if sim is None else sim
     _refuse_twice(loaded.robot)
+    clear_first_records(loaded.robot, simulated=with_sim)
     ended = end_signals()
     stack = Stack(loaded.path.resolve(), namespace=namespace, sim=with_sim, ros_args=for_parts, quiet_sim=not verbose)
     with stack, _reports_when_ready(namespace, for_readiness):

@@ -7,6 +7,7 @@ its channel, and `RatedWire` decides what passes.
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable
 
@@ -22,6 +23,8 @@ from canbase_sim.world.trace import Trace
 
 STEP_S = 0.002
 """Longest wait for a frame, so the longest delay of anything that a drive does by itself."""
+SYNC = 0x080
+"""CiA 301: COB-ID of SYNC."""
 DROPS_TOLD_S = 10.0
 SEND_TIMEOUT_S = 0.05
 """A frame that the bus does not take in this time is a bus error."""
@@ -38,6 +41,8 @@ class Loop:
         self._bench, self._trace, self._control = bench, trace, control
         self._wire = RatedWire(bench, BIT_RATES)
         self._next_step = self._told_drops_at = 0.0
+        self.sync_at_s = -math.inf
+        """When the last SYNC came, by time.monotonic [s]."""
         self.datagrams_dropped = 0
         """Those that were no CAN frame."""
 
@@ -60,6 +65,8 @@ class Loop:
                     self._bus.open_all()
 
     def _take(self, frame: Frame, bitrate: int, now_s: float) -> None:
+        if frame.cob_id == SYNC:
+            self.sync_at_s = now_s
         if not self._bus.is_rated:
             self._bench.on_frame(frame, now_s)
             return

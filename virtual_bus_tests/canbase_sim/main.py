@@ -1,4 +1,9 @@
-"""`canbase serve sim`: the simulated drives of a robot.yaml in real time, until SIGINT or SIGTERM."""
+"""`canbase serve sim`: the simulated drives of a robot.yaml in real time, until SIGINT or SIGTERM.
+
+Ctrl-C and `ros2 launch` interrupt all parts of a robot at once. Drives that vanish while the driver brings the base to
+standstill are a failure of the drives, which is latched for the next start: after one SIGINT they stay as long as they
+receive SYNC.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +11,9 @@ import logging
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from threading import Event
 from types import FrameType
 
 import can
@@ -24,6 +28,9 @@ from canbase_sim.world.trace import Trace
 
 log = logging.getLogger(__name__)
 
+IN_USE_S = 1.0
+"""A driver sends SYNC more often than once in this time [s]."""
+
 
 def run(robot: Robot, control: str | None = None, *, quiet: bool = False, factory_fresh: bool = False) -> int:
     """Simulate the drives of `robot` on its bus, with the control socket at `control` (default `control_path(robot)`).
@@ -33,15 +40,14 @@ def run(robot: Robot, control: str | None = None, *, quiet: bool = False, factor
     """
     logging.basicConfig(
         level=logging.WARNING if quiet else logging.INFO,
-        format="%(asctime)s.%(msecs)03d %(levelname)s canbase.sim: %(message)s",
-        datefmt="%Y-%m-%d %H:%M:%S",
+        format="%(created).6f %(levelname)s canbase.sim: %(message)s",
         stream=sys.stderr,
     )
     logging.getLogger("canopen").setLevel(logging.WARNING)  # it logs every SDO
     path = Path(control) if control else control_path(robot)
-    with _stop_signals() as stop:
+    with _stop_signals() as signals:
         try:
-            _simulate(robot, path, stop, BenchParameters(factory_fresh=factory_fresh))
+            _simulate(robot, path, signals, BenchParameters(factory_fresh=factory_fresh))
         except (can.CanError, OSError) as error:
             log.error("CAN bus %s %s: %s; check `bus` in robot.yaml", robot.bus.interface, robot.bus.channel, error)
             return 1
@@ -51,27 +57,43 @@ def run(robot: Robot, control: str | None = None, *, quiet: bool = False, factor
     return 0
 
 
-def _simulate(robot: Robot, path: Path, stop: Event, parameters: BenchParameters) -> None:
+def _simulate(robot: Robot, path: Path, signals: list[int], parameters: BenchParameters) -> None:
     with closing(RatedBus(robot.bus)) as bus:
         now_s = time.monotonic()
         bench = Bench(robot, now_s, parameters=parameters)
         trace = Trace(bench, now_s)
         with closing(ControlServer(path, bench, trace)) as server:
             log.info("drives %s on %s %s", sorted(bench.nodes), robot.bus.interface, robot.bus.channel)
-            Loop(bus, robot.bus.bitrate, bench, trace, server).run(stop.is_set)
+            loop = Loop(bus, robot.bus.bitrate, bench, trace, server)
+            told = False
+
+            def over() -> bool:
+                nonlocal told
+                ends = is_over(signals, time.monotonic() - loop.sync_at_s)
+                if signals and not ends and not told:
+                    told = True
+                    log.info("the driver still uses these drives: they end after it (Ctrl-C again: at once)")
+                return ends
+
+            loop.run(over)
+
+
+def is_over(signals: Sequence[int], silent_s: float) -> bool:
+    """`signals`: those that came; `silent_s`: since the last SYNC [s]. One SIGINT alone lets the driver end first."""
+    return bool(signals) and (silent_s > IN_USE_S or list(signals) != [signal.SIGINT])
 
 
 @contextmanager
-def _stop_signals() -> Iterator[Event]:
-    """An event that SIGINT and SIGTERM set; afterwards both do again what they did before."""
-    stop = Event()
+def _stop_signals() -> Iterator[list[int]]:
+    """The numbers of the signals that came; afterwards SIGINT and SIGTERM do again what they did before."""
+    received: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        stop.set()
+        received.append(number)
 
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield stop
+        yield received
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -28,9 +28,7 @@ def formatter(environment: Mapping[str, str], stderr: os.stat_result) -> logging
     """The one that fits to where stderr goes: a terminal may have inherited JOURNAL_STREAM (systemd.exec(5))."""
     if _is_journal(environment, stderr):
         return JournalFormatter("%(name)s: %(message)s")
-    lines = logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s")
-    lines.default_msec_format = "%s.%03d"  # as ROS writes it
-    return lines
+    return logging.Formatter("%(created).6f %(levelname)s %(name)s: %(message)s")  # seconds since 1970, as ROS has it
 
 
 class Lines(logging.Handler):

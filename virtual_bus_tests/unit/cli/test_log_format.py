@@ -1,0 +1,31 @@
+"""The times of log lines that ROS writes, read from the text: milliseconds below 100 keep their zeros."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from canbase_cli.log_format import log_times
+
+CODE = """
+import time
+import rclpy.logging
+for _ in range(25):
+    rclpy.logging.get_logger("part").info(f"{time.time():.6f}")
+    time.sleep(0.044)
+"""
+
+
+def test_each_line_has_the_time_at_which_it_was_written() -> None:
+    """25 lines within 1.1 s: some of them in the first tenth of a second."""
+    environment = {name: value for name, value in os.environ.items() if name != "RCUTILS_CONSOLE_OUTPUT_FORMAT"}
+    log_times(environment)
+    done = subprocess.run(
+        [sys.executable, "-c", CODE], env=environment, capture_output=True, text=True, timeout=60.0, check=True
+    )
+    lines = [line.split() for line in done.stderr.splitlines()]
+    written = [(float(at), float(told)) for at, _severity, _name, told in lines]
+    assert len(written) == 25
+    assert any(at % 1.0 < 0.1 for at, _ in written)
+    assert max(abs(at - told) for at, told in written) < 0.05
