@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -26,6 +27,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 from std_msgs.msg import Empty
 
 STEP_S = 0.1
@@ -108,7 +110,7 @@ def main() -> None:
     options.add_argument("--work", choices=("blocking", "pausing", "asyncio"), default="blocking")
     options.add_argument("--group", choices=GROUPS, default="exclusive")
     options.add_argument("--slow-timer", action="store_true", help=f"another callback of the group sleeps {SLOW_S} s")
-    chosen = options.parse_args()
+    chosen = options.parse_args(remove_ros_args(sys.argv)[1:])
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C is Python's KeyboardInterrupt
     executor = EXECUTORS[chosen.executor]()
     executor.add_node(Exercise(chosen.work, GROUPS[chosen.group](), chosen.slow_timer))

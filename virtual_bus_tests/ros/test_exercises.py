@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,8 @@ from rclpy.action import ActionClient
 from std_msgs.msg import Empty
 
 from canbase_action_server.outcome import Status
-from ros.conftest import Spawn
+from support.goal_stage import GoalStage, bare_stage
 from support.marked_page import section
-from support.ros_harness import TestNode
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
@@ -24,7 +24,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 STEPS = 80
 """Of 0.1 s each."""
 LOOK_S = 4.0
-"""So long is looked for the other callbacks, which run ten times a second."""
+"""So long is looked for feedback and for the other callbacks, which run ten times a second."""
 SOME = 5
 
 
@@ -58,71 +58,93 @@ def rows() -> list[Row]:
 
 
 class Lesson:
-    """The server of one row, and a client that looks at it."""
+    """The server of one row, in a namespace of its own, and a client that looks at it."""
 
-    def __init__(self, node: TestNode, spawn: Spawn, row: Row) -> None:
-        self.node = node
-        self.server = spawn([sys.executable, str(DOCS / "examples" / "executors.py"), *row.arguments])
-        self.beats = node.record(Empty, "heartbeat")
+    def __init__(self, stage: GoalStage, row: Row, space: str) -> None:
+        self.row, self.node = row, stage.node
+        program = str(DOCS / "examples" / "executors.py")
+        self.server = stage.spawn([sys.executable, program, *row.arguments, "--ros-args", "-r", f"__ns:=/{space}"])
+        self.beats = self.node.record(Empty, f"{space}/heartbeat")
+        self.client = ActionClient(self.node.node, Fibonacci, f"{space}/fibonacci")
         self.feedback: list[float] = []
-        self._client = ActionClient(node.node, Fibonacci, "fibonacci")
-        node.wait_for(self._client.server_is_ready, 30.0, "the server")
-        node.wait_for(lambda: self.beats.last, 30.0, "a heartbeat")
-        node.spin_for(0.5)
-        self.handles = [self._sent() for _ in range(row.goals)]
-        self.result = self.handles[0].get_result_async()
+        self.goals: list[Any] = []
+        """The answers to goals, then the handles."""
+        self.found: dict[str, str] = {}
+        """What the columns of the row show."""
 
-    def _sent(self) -> Any:
+    def send(self) -> None:
         goal = Fibonacci.Goal(order=STEPS)
-        future = self._client.send_goal_async(goal, feedback_callback=lambda _: self.feedback.append(time.monotonic()))
-        self.node.wait_for(future.done, 30.0, "the acceptance")
-        return future.result()
+        heard = lambda _: self.feedback.append(time.monotonic())  # noqa: E731
+        self.goals = [self.client.send_goal_async(goal, feedback_callback=heard) for _ in range(self.row.goals)]
 
-    @property
-    def status(self) -> str:
-        self.node.wait_for(self.result.done, 30.0, "the result")
-        return Status(self.result.result().status).name
+    def accepted(self) -> None:
+        """Until the goals are; from now on the result of the first one is waited for."""
+        self.node.wait_for(lambda: all(each.done() for each in self.goals), 30.0, "the acceptance")
+        self.goals = [each.result() for each in self.goals]
+        self.result = self.goals[0].get_result_async()
 
-    @property
-    def steps(self) -> list[int]:
-        """How many were done."""
-        return list(self.result.result().result.sequence)
+    def end(self) -> None:
+        """When the cancel was answered, and how the goal ended."""
+        self.node.wait_for(lambda: self.result.done() and (self.cancel is None or self.cancel.done()), 30.0, "the end")
+        wrapped = self.result.result()
+        self.found["end"] = Status(wrapped.status).name
+        if self.cancel is not None:
+            at_once = bool(self.cancel.result().goals_canceling) and wrapped.result.sequence[0] < STEPS
+            self.found["cancel"] = "at once" if at_once else "after the work"
 
-    def others(self) -> str:
-        """Whether the other callbacks run, from now on."""
+    def look(self, since_s: float) -> None:
+        """Feedback, and whether the other callbacks run."""
+        self.found["feedback"] = "yes" if len(self.feedback) >= SOME else "none" if not self.feedback else "once"
+        self.found["others"] = "run" if len(self.beats.since(since_s)) >= SOME else "stand still"
+
+    def request_cancel(self) -> None:
+        """Of the first goal, where the row has one and it runs."""
+        wanted = self.row.cancel != "–"
+        self.cancel = self.goals[0].cancel_goal_async() if wanted else None
+
+
+def run(stage: GoalStage, lessons: list[Lesson]) -> None:
+    """Until all goals of these rows show that they run."""
+    for each in lessons:
+        each.send()
+    for each in lessons:
+        each.accepted()
+    shown = lambda: all(each.feedback or each.row.feedback == "none" for each in lessons)  # noqa: E731
+    stage.node.wait_for(shown, 30.0, "feedback")
+
+
+@pytest.fixture(scope="module")
+def lessons() -> Iterator[dict[str, Lesson]]:
+    """All rows at once: their servers sleep most of the time."""
+    with bare_stage() as stage:
+        made = [Lesson(stage, row, f"row{number}") for number, row in enumerate(rows())]
+        for each in made:
+            stage.node.wait_for(each.client.server_is_ready, 60.0, "the server")
+            stage.node.wait_for(lambda beats=each.beats: beats.last, 30.0, "a heartbeat")  # type: ignore[misc]
+        stage.node.spin_for(0.5)
+        slow = [each for each in made if "slow timer" in each.row.work]  # their timers keep a goal waiting for seconds
+        run(stage, slow)
+        run(stage, [each for each in made if each not in slow])
         began_s = time.monotonic()
-        until_s = began_s + LOOK_S
-
-        def seen() -> bool:
-            return len(self.beats.since(began_s)) >= SOME or time.monotonic() > until_s
-
-        self.node.wait_for(seen, 30.0, "heartbeats")
-        return "run" if len(self.beats.since(began_s)) >= SOME else "stand still"
-
-    def canceled(self) -> tuple[str, str]:
-        """When the cancel is answered, and how the goal ends."""
-        answer = self.handles[0].cancel_goal_async()
-        self.node.wait_for(lambda: answer.done() and self.result.done(), 30.0, "answer and result")
-        at_once = bool(answer.result().goals_canceling) and self.steps[0] < STEPS
-        return ("at once" if at_once else "after the work"), self.status
+        stage.node.spin_for(LOOK_S)
+        for each in made:
+            each.look(began_s)
+        for each in made:
+            each.request_cancel()
+        for each in made:
+            if each.row.end != "–":
+                each.end()
+        yield {str(each.row): each for each in made}
 
 
 @pytest.mark.parametrize("row", rows(), ids=str)
-def test_what_the_page_says_happens(row: Row, test_node: TestNode, spawn: Spawn) -> None:
-    lesson = Lesson(test_node, spawn, row)
-    if row.feedback == "none":
-        assert (lesson.status, lesson.feedback) == (row.end, [])
-        assert "no running event loop" in lesson.server.log()
-        assert lesson.others() == row.others
-        return
-    test_node.wait_for(lambda: lesson.feedback, 30.0, "feedback")
-    assert lesson.others() == row.others
-    test_node.wait_for(lambda: len(lesson.feedback) >= SOME, 30.0, "more feedback")
-    if row.cancel == "–":
-        return
-    cancel, end = lesson.canceled()
-    assert cancel == row.cancel
-    assert end in row.end.split(" or ")
+def test_what_the_page_says_happens(row: Row, lessons: dict[str, Lesson]) -> None:
+    lesson = lessons[str(row)]
+    assert lesson.found["feedback"] == row.feedback
+    assert lesson.found["others"] == row.others
+    assert lesson.found.get("cancel", "–") == row.cancel
+    assert lesson.found.get("end", "–") in row.end.split(" or ")
+    assert ("no running event loop" in lesson.server.log()) == (row.feedback == "none")
 
 
 def test_the_table_has_every_executor_group_and_work() -> None:

@@ -1,21 +1,22 @@
-"""The goal policies over DDS: one owner of the base, whatever several clients send and cancel at the same time."""
+"""The goal policies over DDS: one owner of the base, whatever several clients send and cancel at the same time.
+
+Each policy under storms of goals: unit/action_server/test_goal_queue.py. `reject`: test_action_server.py.
+"""
 
 from __future__ import annotations
 
-import json
 import random
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
 from canbase.action import DriveDistance
 from rclpy.action import ActionClient
 
-from canbase_action_server.client import DriveClient
 from canbase_action_server.goal_client import SERVICE_QOS
 from canbase_action_server.outcome import ErrorCode, Status
-from ros.conftest import MakeRobot, Spawn
-from support.fake_base import FakeBase, server_code
-from support.ros_harness import Process, TestNode
+from support.goal_stage import PATIENT_S, GoalStage, goal_stage
 
 pytestmark = pytest.mark.ros
 
@@ -23,21 +24,15 @@ pytestmark = pytest.mark.ros
 class Crowd:
     """A server, its base, and several clients that neither wait nor ask twice."""
 
-    def __init__(self, node: TestNode, spawn: Spawn, make_robot: MakeRobot, **action: Any) -> None:
-        self.node = node
-        # A loaded test machine may hold the test's base up for longer than the 0.2 s of a robot.
-        robot = make_robot({"timeouts": {"odometry_s": 1.0}, "action": {"progress_timeout_s": 5.0, **action}})
-        self.server: Process = spawn(server_code(robot))
-        self.base = FakeBase(node)
+    def __init__(self, stage: GoalStage) -> None:
+        self.stage, self.node = stage, stage.node
         self.clients = [
-            ActionClient(node.node, DriveDistance, "drive_distance", goal_service_qos_profile=SERVICE_QOS,
+            ActionClient(stage.node.node, DriveDistance, "drive_distance", goal_service_qos_profile=SERVICE_QOS,
                          result_service_qos_profile=SERVICE_QOS, cancel_service_qos_profile=SERVICE_QOS)
             for _ in range(4)
         ]  # fmt: skip
-        DriveClient(node.node, node.executor).wait_for_server(20.0)
-        node.wait_for(lambda: all(client.server_is_ready() for client in self.clients), 10.0, "all clients")
-        node.wait_for(lambda: self.base.heard, 20.0, "the server to listen")
-        node.spin_for(0.5)
+        ready = lambda: all(client.server_is_ready() for client in self.clients)  # noqa: E731
+        stage.node.wait_for(ready, PATIENT_S, "all clients")
         self.results: dict[str, list[Any]] = {}
         self.handles: dict[str, Any] = {}
         self.sent = self.answered = 0
@@ -63,11 +58,6 @@ class Crowd:
         (wrapped,) = self.results[uuid]
         return Status(wrapped.status), ErrorCode(wrapped.result.error_code)
 
-    def steps(self) -> list[dict[str, Any]]:
-        """The structured lines of the server's log."""
-        lines = (line for line in self.server.log().splitlines() if '{"uuid"' in line)
-        return [json.loads(line[line.index("{") :]) for line in lines]
-
     def _on_answer(self, future: Any) -> None:
         self.answered += 1
         handle = future.result()
@@ -78,31 +68,34 @@ class Crowd:
             result.add_done_callback(lambda done: self.results.setdefault(uuid, []).append(done.result()))
 
 
-@pytest.mark.parametrize("policy", ["reject", "queue", "preempt"])
-def test_200_goals_and_cancels_of_several_clients_each_end_once_and_rightly(
-    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot, policy: str
-) -> None:
-    crowd = Crowd(test_node, spawn, make_robot, goal_policy=policy, queue_length=3)
-    chance, canceled = random.Random(1), set()
-    for _ in range(200):
-        way_m = chance.choice((-1, 1)) * chance.uniform(0.01, 0.1)
-        crowd.send(way_m, chance.uniform(0.1, 0.5), client=chance.randrange(4))
-        crowd.node.spin_for(chance.choice((0.0, 0.01, 0.05, 0.3)))
-        living = [uuid for uuid in crowd.handles if uuid not in crowd.results]
-        if living and chance.random() < 0.5:
-            canceled.add(living[-1])
-            crowd.handles[living[-1]].cancel_goal_async()
-    crowd.wait_for_the_end()
-    allowed = {
-        (Status.SUCCEEDED, ErrorCode.OK): set(crowd.handles),
-        (Status.CANCELED, ErrorCode.CANCELED): canceled,
-        (Status.ABORTED, ErrorCode.PREEMPTED): set(crowd.handles) if policy == "preempt" else set(),
-    }
-    ends = {uuid: crowd.end(uuid) for uuid in crowd.handles}
-    assert {uuid: end for uuid, end in ends.items() if uuid not in allowed.get(end, set())} == {}
-    assert one_at_a_time(crowd.steps())
-    assert len(crowd.handles) > 10
-    assert crowd.node.node.count_publishers("cmd_vel_action") == 1
+@contextmanager
+def crowd_before(**action: Any) -> Iterator[Crowd]:
+    with goal_stage({"timeouts": {"odometry_s": 1.0}, "action": {"progress_timeout_s": 5.0, **action}}) as stage:
+        yield Crowd(stage)
+
+
+def test_60_goals_and_cancels_of_several_clients_each_end_once_and_rightly() -> None:
+    with crowd_before(goal_policy="preempt") as crowd:
+        chance, canceled = random.Random(1), set()
+        for _ in range(60):
+            way_m = chance.choice((-1, 1)) * chance.uniform(0.01, 0.1)
+            crowd.send(way_m, chance.uniform(0.1, 0.5), client=chance.randrange(4))
+            crowd.node.spin_for(chance.choice((0.0, 0.01, 0.05, 0.3)))
+            living = [uuid for uuid in crowd.handles if uuid not in crowd.results]
+            if living and chance.random() < 0.5:
+                canceled.add(living[-1])
+                crowd.handles[living[-1]].cancel_goal_async()
+        crowd.wait_for_the_end()
+        allowed = {
+            (Status.SUCCEEDED, ErrorCode.OK): set(crowd.handles),
+            (Status.CANCELED, ErrorCode.CANCELED): canceled,
+            (Status.ABORTED, ErrorCode.PREEMPTED): set(crowd.handles),
+        }
+        ends = {uuid: crowd.end(uuid) for uuid in crowd.handles}
+        assert {uuid: end for uuid, end in ends.items() if uuid not in allowed.get(end, set())} == {}
+        assert one_at_a_time(crowd.stage.steps())
+        assert len(crowd.handles) > 10
+        assert crowd.node.node.count_publishers("cmd_vel_action") == 1
 
 
 def one_at_a_time(steps: list[dict[str, Any]]) -> bool:
@@ -119,38 +112,23 @@ def one_at_a_time(steps: list[dict[str, Any]]) -> bool:
     return len(ended) == len(set(ended))
 
 
-def test_a_queue_drives_in_order_and_a_queued_goal_can_be_canceled(
-    test_node: TestNode, spawn: Spawn, make_robot: MakeRobot
-) -> None:
+def test_a_queue_drives_in_order_and_a_queued_goal_can_be_canceled() -> None:
     # A server that a loaded machine holds up by 0.2 s brakes too late for 5 mm: OVERSHOOT. This is about order.
-    crowd = Crowd(test_node, spawn, make_robot, goal_policy="queue", queue_length=2, tolerance_m=0.04)
-    for distance_m in (0.3, 0.2, -0.1):
-        crowd.send(distance_m, 0.3)
-        test_node.wait_for(lambda: crowd.answered == crowd.sent, 5.0, "the answer")
-        test_node.spin_for(0.1)
-    first, second, third = crowd.accepted(3)
-    crowd.send(0.1, 0.3)  # one runs, two wait: no place
-    crowd.handles[second].cancel_goal_async()
-    test_node.wait_for(lambda: second in crowd.results, 5.0, "the end of the queued goal")
-    assert first not in crowd.results
-    crowd.wait_for_the_end()
-    assert crowd.sent - len(crowd.handles) == 1
-    assert [crowd.end(uuid) for uuid in (first, second, third)] == [
-        (Status.SUCCEEDED, ErrorCode.OK),
-        (Status.CANCELED, ErrorCode.CANCELED),
-        (Status.SUCCEEDED, ErrorCode.OK),
-    ]
-    assert crowd.base.x_m == pytest.approx(0.2, abs=0.09)  # the two that ran, each within its tolerance
-
-
-def test_a_newer_goal_gets_the_base_after_a_stop(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
-    crowd = Crowd(test_node, spawn, make_robot, goal_policy="preempt")
-    crowd.send(2.0, 0.3)
-    (old,) = crowd.accepted(1)
-    test_node.wait_for(lambda: crowd.base.speed_mps > 0.15, 5.0, "the base to move")
-    crowd.send(-0.1, 0.3)
-    test_node.wait_for(lambda: old in crowd.results, 5.0, "the end of the old goal")
-    assert abs(crowd.base.speed_mps) < 0.02
-    assert crowd.end(old) == (Status.ABORTED, ErrorCode.PREEMPTED)
-    crowd.wait_for_the_end()
-    assert crowd.end(crowd.accepted(2)[1]) == (Status.SUCCEEDED, ErrorCode.OK)
+    with crowd_before(goal_policy="queue", queue_length=2, tolerance_m=0.04) as crowd:
+        for distance_m in (0.3, 0.2, -0.1):
+            crowd.send(distance_m, 0.3)
+            crowd.node.wait_for(lambda: crowd.answered == crowd.sent, 5.0, "the answer")
+            crowd.node.spin_for(0.1)
+        first, second, third = crowd.accepted(3)
+        crowd.send(0.1, 0.3)  # one runs, two wait: no place
+        crowd.handles[second].cancel_goal_async()
+        crowd.node.wait_for(lambda: second in crowd.results, 5.0, "the end of the queued goal")
+        assert first not in crowd.results
+        crowd.wait_for_the_end()
+        assert crowd.sent - len(crowd.handles) == 1
+        assert [crowd.end(uuid) for uuid in (first, second, third)] == [
+            (Status.SUCCEEDED, ErrorCode.OK),
+            (Status.CANCELED, ErrorCode.CANCELED),
+            (Status.SUCCEEDED, ErrorCode.OK),
+        ]
+        assert crowd.stage.base.x_m == pytest.approx(0.2, abs=0.09)  # the two that ran, each within its tolerance

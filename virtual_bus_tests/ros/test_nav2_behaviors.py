@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
+import time
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -15,11 +16,9 @@ from geometry_msgs.msg import Point
 from nav2_msgs.action import BackUp, DriveOnHeading, Spin
 from rclpy.action import ActionClient, ActionServer
 
-from canbase_action_server.client import DriveClient
 from canbase_action_server.goal_client import REJECTION_QOS
-from ros.conftest import MakeRobot, Spawn
-from support.fake_base import FakeBase, server_code
-from support.ros_harness import Process, TestNode
+from support.goal_stage import PATIENT_S, GoalStage, goal_stage
+from support.ros_harness import TestNode
 from support.sros2_policy import allowed, present
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(90)]
@@ -29,17 +28,14 @@ TOLERANCE_M = 0.005
 TOLERANCE_RAD = 0.005 / 0.2
 
 
-class Stage:
-    """A running server before a base, and a client of each behaviour."""
+class Behaviors:
+    """A client of each behaviour."""
 
-    def __init__(self, node: TestNode, server: Process, names: dict[str, str]) -> None:
-        """`names`: of the actions, where they are not Nav2's."""
-        self.node, self.server = node, server
-        self.base = FakeBase(node)
-        self.clients = {kind: ActionClient(node.node, KINDS[kind], names.get(kind, kind)) for kind in KINDS}
-        node.wait_for(lambda: all(each.server_is_ready() for each in self.clients.values()), 20.0, "the servers")
-        node.wait_for(lambda: self.base.heard, 20.0, "the server to listen")
-        node.spin_for(1.0)
+    def __init__(self, stage: GoalStage) -> None:
+        self.goals, self.node, self.base = stage, stage.node, stage.base
+        self.clients = {kind: ActionClient(stage.node.node, KINDS[kind], kind) for kind in KINDS}
+        ready = lambda: all(each.server_is_ready() for each in self.clients.values())  # noqa: E731
+        stage.node.wait_for(ready, PATIENT_S, "the servers")
         self.feedback: list[Any] = []
 
     def send(self, kind: str, **goal: Any) -> Any:
@@ -67,38 +63,36 @@ class Stage:
     def rejection(self, kind: str) -> str:
         """Why a goal is rejected now."""
         assert not self.send(kind).accepted
-        return self.log_reason()
-
-    def log_reason(self) -> str:
-        """Of the newest rejection."""
-        lines = [line for line in self.server.log().splitlines() if '"step": "rejected"' in line]
-        return str(json.loads(lines[-1][lines[-1].index("{") :])["reason"])
+        return self.goals.last_reason()
 
 
-def robot_yaml(make_robot: MakeRobot) -> Any:
-    # A loaded test machine may hold the test's base up for longer than the 0.2 s of a robot.
-    return make_robot({"timeouts": {"odometry_s": 1.0}, "action": {"nav2_behaviors": True}})
+@pytest.fixture(scope="module")
+def running() -> Iterator[Behaviors]:
+    with goal_stage({"action": {"nav2_behaviors": True}}) as stage:
+        yield Behaviors(stage)
 
 
 @pytest.fixture
-def stage(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> Stage:
-    return Stage(test_node, spawn(server_code(robot_yaml(make_robot))), {})
+def stage(running: Behaviors) -> Iterator[Behaviors]:
+    running.goals.recovered()
+    yield running
+    print(running.goals.server.log()[-3000:])
 
 
-def test_each_behaviour_ends_at_its_goal_with_feedback_and_time(stage: Stage) -> None:
+def test_each_behaviour_ends_at_its_goal_with_feedback_and_time(stage: Behaviors) -> None:
     for kind, goal, way_m, turn_rad in (
         ("drive_on_heading", {"target": Point(x=0.3), "speed": 0.3}, 0.3, 0.0),
         ("backup", {"target": Point(x=0.2), "speed": 0.3}, -0.2, 0.0),
         ("spin", {"target_yaw": -1.57}, 0.0, -1.57),
     ):
-        x_m, y_m, yaw_rad = stage.base.x_m, stage.base.y_m, stage.base.yaw_rad
+        stage.goals.recovered()
         handle = stage.send(kind, time_allowance=Duration(sec=15), **goal)
         wrapped = stage.result(handle)
         kind_of = KINDS[kind].Result
         assert (wrapped.status, wrapped.result.error_code) == (GoalStatus.STATUS_SUCCEEDED, kind_of.NONE)
-        driven_m = math.hypot(stage.base.x_m - x_m, stage.base.y_m - y_m)
+        driven_m = math.hypot(stage.base.x_m, stage.base.y_m)
         assert driven_m == pytest.approx(abs(way_m), abs=TOLERANCE_M)
-        assert stage.base.yaw_rad - yaw_rad == pytest.approx(turn_rad, abs=TOLERANCE_RAD)
+        assert stage.base.yaw_rad == pytest.approx(turn_rad, abs=TOLERANCE_RAD)
         elapsed = wrapped.result.total_elapsed_time
         assert 0.5 < elapsed.sec + 1e-9 * elapsed.nanosec < 15.0
         last = stage.feedback[-1]
@@ -108,8 +102,8 @@ def test_each_behaviour_ends_at_its_goal_with_feedback_and_time(stage: Stage) ->
             assert last.distance_traveled == pytest.approx(abs(way_m), abs=0.05)
 
 
-def test_what_ends_a_goal_has_the_code_of_nav2_and_the_reason_in_words(stage: Stage) -> None:
-    aborted = GoalStatus.STATUS_ABORTED
+def test_what_ends_a_goal_has_the_code_of_nav2_and_the_reason_in_words(stage: Behaviors) -> None:
+    aborted, began_s = GoalStatus.STATUS_ABORTED, time.monotonic()
     status, code, text = stage.end("drive_on_heading", target=Point(x=0.3), speed=-0.3)
     assert (status, code) == (aborted, DriveOnHeading.Result.INVALID_INPUT)
     assert "same sign" in text
@@ -118,13 +112,13 @@ def test_what_ends_a_goal_has_the_code_of_nav2_and_the_reason_in_words(stage: St
     status, code, text = stage.end("spin", target_yaw=0.0)
     assert (status, code) == (aborted, Spin.Result.UNKNOWN)
     assert text.startswith("INVALID_GOAL: |angle_rad| is 0")
-    assert stage.base.orders == [] or set(stage.base.orders_since(0.0)) == {0.0}
+    assert set(stage.base.orders_since(began_s)) <= {0.0}
     status, code, text = stage.end("backup", target=Point(x=2.0), speed=0.2, time_allowance=Duration(sec=1))
     assert (status, code) == (aborted, BackUp.Result.TIMEOUT)
     assert "1.0 s" in text
 
 
-def test_an_obstacle_is_a_collision_ahead_lost_odometry_a_tf_error_and_a_stop_unknown(stage: Stage) -> None:
+def test_an_obstacle_is_a_collision_ahead_lost_odometry_a_tf_error_and_a_stop_unknown(stage: Behaviors) -> None:
     for kind, change, name in (
         ("spin", lambda base: setattr(base, "safety", _stop(SafetyState.CAUSE_OBSTACLE)), "COLLISION_AHEAD"),
         ("backup", lambda base: base.silent.add("odom"), "TF_ERROR"),
@@ -137,15 +131,14 @@ def test_an_obstacle_is_a_collision_ahead_lost_odometry_a_tf_error_and_a_stop_un
         wrapped = stage.result(handle)
         assert wrapped.status == GoalStatus.STATUS_ABORTED
         assert wrapped.result.error_code == getattr(KINDS[kind].Result, name), wrapped.result.error_msg
-        stage.base.heal()
-        stage.node.spin_for(0.5)
+        stage.goals.recovered()
 
 
 def _stop(cause: str) -> SafetyState:
     return SafetyState(action=SafetyState.STOP, cause=cause, detail="as the test says")
 
 
-def test_a_cancel_ends_canceled_when_the_base_is_at_standstill(stage: Stage) -> None:
+def test_a_cancel_ends_canceled_when_the_base_is_at_standstill(stage: Behaviors) -> None:
     handle = stage.send("drive_on_heading", target=Point(x=3.0), speed=0.4)
     stage.node.wait_for(lambda: stage.base.speed_mps > 0.2, 5.0, "the base to move")
     handle.cancel_goal_async()
@@ -156,41 +149,14 @@ def test_a_cancel_ends_canceled_when_the_base_is_at_standstill(stage: Stage) -> 
     assert 0.02 < stage.base.x_m < 2.0
 
 
-def test_a_goal_right_after_the_controller_waits_for_it_and_one_under_the_joystick_is_rejected(stage: Stage) -> None:
-    stage.base.mux.active = "navigation"
-    stage.node.spin_for(0.2)
-    handle = stage.send("backup", target=Point(x=0.2), speed=0.3)
-    assert handle.accepted
-    stage.node.spin_for(0.7)
-    assert stage.base.x_m == 0.0
-    stage.base.mux.active = ""
-    assert stage.result(handle).status == GoalStatus.STATUS_SUCCEEDED
-    stage.base.mux.active = "joystick"
-    stage.node.spin_for(0.2)
-    assert not stage.send("spin", target_yaw=1.0).accepted
-    assert "joystick" in stage.log_reason()
-
-
-def test_all_actions_share_one_base(stage: Stage) -> None:
-    drives = DriveClient(stage.node.node, stage.node.executor)
-    drives.wait_for_server(5.0)
-    handle = stage.send("spin", target_yaw=2.0)
-    assert not stage.send("backup", target=Point(x=0.2), speed=0.3).accepted
-    assert "busy" in stage.log_reason()
-    assert stage.result(handle).status == GoalStatus.STATUS_SUCCEEDED
-    drive = drives.send(0.1, 0.2).wait(10.0)
-    assert drive is not None
-    assert drive.status == GoalStatus.STATUS_SUCCEEDED
-
-
-def test_the_shipped_sros2_policy_allows_all_that_the_server_has(stage: Stage) -> None:
+def test_the_shipped_sros2_policy_allows_all_that_the_server_has(stage: Behaviors) -> None:
     has, may = present(stage.node.node, "drive_distance_server"), allowed("drive_distance_server")
     assert "/spin/_action/send_goal" in has["reply"]
     assert {way: names - may[way] for way, names in has.items()} == {way: set() for way in has}
 
 
-def test_while_another_node_serves_the_same_name_no_goal_is_driven(stage: Stage) -> None:
-    with TestNode("behavior_server") as nav2:
+def test_while_another_node_serves_the_same_name_no_goal_is_driven(stage: Behaviors) -> None:
+    with TestNode("behavior_server", domain_id=stage.goals.domain) as nav2:
         server = ActionServer(nav2.node, Spin, "spin", lambda _: None)  # it does not spin, and answers nothing
         rejections: list[Any] = []
         nav2.node.create_subscription(DiagnosticStatus, "spin/rejection", rejections.append, REJECTION_QOS)
@@ -202,23 +168,10 @@ def test_while_another_node_serves_the_same_name_no_goal_is_driven(stage: Stage)
         stage.base.mux.active = ""
         stage.node.spin_for(0.2)
         assert not stage.send("spin", target_yaw=1.0).accepted
-        assert "serves /spin too" in stage.log_reason()
+        assert "serves /spin too" in stage.goals.last_reason()
         stage.node.wait_for(lambda: "/behavior_server serves" in stage.rejection("spin"), 10.0, "the other one's name")
         assert stage.base.yaw_rad == 0.0
         server.destroy()
     stage.node.wait_for(lambda: stage.node.node.count_services("spin/_action/send_goal") == 1, 10.0, "its end")
     stage.node.spin_for(1.0)
     assert stage.end("spin", target_yaw=0.5)[0] == GoalStatus.STATUS_SUCCEEDED
-
-
-def test_the_names_can_be_remapped(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
-    code = server_code(robot_yaml(make_robot)).replace("sys.argv[1:]", "['--ros-args', '-r', 'spin:=exact/spin']")
-    stage = Stage(test_node, spawn(code), {"spin": "exact/spin"})
-    assert stage.end("spin", target_yaw=0.5)[0] == GoalStatus.STATUS_SUCCEEDED
-
-
-def test_by_default_nav2_has_these_names_for_itself(test_node: TestNode, spawn: Spawn, make_robot: MakeRobot) -> None:
-    spawn(server_code(make_robot({})))
-    DriveClient(test_node.node, test_node.executor).wait_for_server(20.0)
-    test_node.spin_for(1.0)
-    assert [test_node.node.count_services(f"{kind}/_action/send_goal") for kind in KINDS] == [0, 0, 0]

@@ -1,5 +1,5 @@
 """Stand-ins wired as Nav2's launch file wires Nav2: with what `canbase print nav2` prints they drive the base, and
-each of five mistakes is named by `canbase doctor`, with its cure.
+`canbase doctor` names mistakes with their cure. Each mistake alone: unit/doctor/test_nav2_checks.py.
 """
 
 from __future__ import annotations
@@ -107,11 +107,10 @@ def one(rows: list[Row], found: str) -> Row:
     return told[0]
 
 
-@pytest.mark.parametrize("stamped", [False, True], ids=["as in jazzy", "as in main"])
-def test_what_canbase_nav2_prints_drives_the_base_within_its_limits(site: Site, stamped: bool) -> None:
+def test_what_canbase_nav2_prints_drives_the_base_within_its_limits(site: Site) -> None:
     printed = site.printed
     site.wait_until_armed()
-    with site.nav2({**printed, "stamped": stamped}):
+    with site.nav2({**printed, "stamped": False}):  # the default of Jazzy, which the printed parameters change
         speeds = lambda: {order.twist.linear.x for order in site.orders.messages}  # noqa: E731
         site.node.wait_for(lambda: 0.6 in speeds(), START_S, "Nav2 to drive")
         rows = site.doctor()
@@ -123,39 +122,21 @@ def test_what_canbase_nav2_prints_drives_the_base_within_its_limits(site: Site, 
     assert (docking["verdict"], "docking" in docking["advice"]) == ("warn", True)
 
 
-def test_five_mistakes_are_named_with_their_cure(site: Site) -> None:
-    """Each is one change to what canbase print nav2 prints, or Nav2 as it comes."""
+def test_mistakes_are_named_with_their_cure(site: Site) -> None:
     printed = site.printed
-    with site.nav2({}):  # 1. Nav2's own launch file and parameters, canbase print nav2 never called
+    with site.nav2({}):  # Nav2's own launch file and parameters, canbase print nav2 never called
         rows = site.doctor()
     row = one(rows, "the input of motor_driver")
     assert {"docking_server", "following_server", "collision_monitor"} <= set(row["found"].replace(";", "").split())
     assert "docking_server:cmd_vel:=cmd_vel_docking" in row["advice"]
     assert "cmd_vel_out_topic: cmd_vel_nav" in row["advice"]
 
-    with site.nav2({**printed, "remappings": []}):  # 2. our parameters, but not our launch file
-        rows = site.doctor()
-    row = one(rows, "a loop")
-    assert "collision_monitor → cmd_vel_nav → velocity_smoother" in row["found"]
-    assert "canbase print nav2 --launch" in row["advice"]
-    assert one(rows, "before velocity_smoother has")["verdict"] == "fail"
-    assert one(rows, "has 3 publishers")["verdict"] == "fail"
-
-    site.change("collision_monitor", enable_stamped_cmd_vel=False)  # 3. Twist where others have TwistStamped
+    site.change("collision_monitor", enable_stamped_cmd_vel=False)  # Twist where others have TwistStamped
+    site.change("velocity_smoother", max_velocity=[1.0, 0.0, 2.0])  # faster than the base
     with site.nav2(printed):
         rows = site.doctor()
     row = one(rows, "collision_monitor publishes Twist on /cmd_vel_nav, velocity_mux reads TwistStamped")
     assert "collision_monitor: enable_stamped_cmd_vel: true" in row["advice"]
     assert one(rows, "velocity_smoother publishes TwistStamped on /cmd_vel_smoothed")["verdict"] == "fail"
-
-    site.change("collision_monitor", enable_stamped_cmd_vel=True, cmd_vel_out_topic="cmd_vel_out")  # 4. another name
-    with site.nav2(printed):
-        rows = site.doctor()
-    assert "cmd_vel_out_topic: cmd_vel_nav" in one(rows, "nobody reads /cmd_vel_out of collision_monitor")["advice"]
-
-    site.change("collision_monitor", cmd_vel_out_topic="cmd_vel_nav")
-    site.change("velocity_smoother", max_velocity=[1.0, 0.0, 2.0])  # 5. faster than the base
-    with site.nav2(printed):
-        rows = site.doctor()
     row = one(rows, "velocity_smoother max_velocity is 1 m/s, robot.yaml permits 0.6")
     assert (row["verdict"], "canbase print nav2" in row["advice"]) == ("warn", True)
