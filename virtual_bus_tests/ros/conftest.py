@@ -17,7 +17,7 @@ from canbase_cli.middleware import prefer_udp
 from canbase_config.load import load_robot
 from canbase_config.robot import Robot
 from support.ros_harness import Process, TestNode, clear_records, merged, python_argv, reserve_domain, robot_values
-from support.velocity_chain import RUN, Chain
+from support.velocity_chain import RUN, Chain, chain_with
 
 Spawn = Callable[..., Process]
 MakeRobot = Callable[[Mapping[str, Any]], Path]
@@ -147,3 +147,10 @@ def start(
 @pytest.fixture
 def chain(start: Callable[[Mapping[str, Any]], Chain]) -> Chain:
     return start({})
+
+
+@pytest.fixture(scope="module")
+def module_chain(request: pytest.FixtureRequest) -> Iterator[Chain]:
+    """One chain for all tests of a module, with its CHANGES of robot.yaml; each test begins with `rest`."""
+    with chain_with(getattr(request.module, "CHANGES", {})) as chain:
+        yield chain

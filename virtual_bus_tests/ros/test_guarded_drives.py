@@ -10,6 +10,7 @@ from canbase.msg import DriverStatus
 from canbase_config.watchdog import LIFE_TIME_FACTOR, guard_time_ms
 from support.crews import robot_with
 from support.running_robot import PATIENT, RunningRobot, own_domain, robot_on
+from support.velocity_chain import drive
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(200)]
 GUARDED = [drive.model_dump(exclude_none=True) for drive in robot_with("technosoft").drives]
@@ -40,4 +41,6 @@ def test_guarded_drives_stop_when_the_watchdog_dies_and_drive_again_after_a_rese
         robot.stack.start()
         robot.wait_state(DriverStatus.LATCHED)
         robot.make_ready()
-        robot.wait_whole()  # goals wait until DDS has given up what was killed
+        joystick = robot.node.source()  # goals wait until DDS has given up what was killed
+        joystick.message = drive(0.1)
+        robot.wait_speed(0.09)

@@ -16,12 +16,20 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 
 from canbase_config.robot import Robot
 from canbase_velocity.filter_node import FilterNode
-from support.ros_harness import Process, TestNode
+from support.ros_harness import Process, TestNode, clear_records
 from support.velocity_chain import Chain, drive
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(60)]
 ANSWER_S = 10.0
 LINEAR, ANGULAR = "speed_limit.linear_mps", "speed_limit.angular_radps"
+
+
+@pytest.fixture
+def chain(module_chain: Chain) -> Chain:
+    """With the limits of robot.yaml."""
+    module_chain.rest()
+    assert put(module_chain, speed_limit__linear_mps=1.0).successful
+    return module_chain
 
 
 def call(chain: Chain, kind: Any, name: str, request: Any) -> Any:
@@ -30,6 +38,7 @@ def call(chain: Chain, kind: Any, name: str, request: Any) -> Any:
     chain.node.wait_for(client.service_is_ready, ANSWER_S, name)
     answer = client.call_async(request)
     chain.node.wait_for(answer.done, ANSWER_S, "an answer")
+    chain.node.node.destroy_client(client)
     return answer.result()
 
 
@@ -78,15 +87,13 @@ def test_the_speed_is_lowered_in_motion_and_the_watchdog_is_told_with_every_leas
     chain.wait_for_order(0.8)
 
 
-@pytest.mark.parametrize("value", [1.01, -0.1, float("nan"), float("inf")])
-def test_a_limit_above_robot_yaml_or_none_at_all_is_refused_and_the_one_before_stays(
-    chain: Chain, value: float
-) -> None:
+def test_a_limit_above_robot_yaml_or_none_at_all_is_refused_and_the_one_before_stays(chain: Chain) -> None:
     assert put(chain, speed_limit__linear_mps=0.2).successful
-    result = put(chain, speed_limit__linear_mps=value)
-    assert not result.successful
-    assert "expected 0 to 1" in result.reason
-    assert get(chain, LINEAR) == [0.2]
+    for value in (1.01, -0.1, float("nan"), float("inf")):
+        result = put(chain, speed_limit__linear_mps=value)
+        assert not result.successful
+        assert "expected 0 to 1" in result.reason
+        assert get(chain, LINEAR) == [0.2]
     chain.joystick.message = drive(0.8)
     chain.wait_for_order(0.2)
 
@@ -96,33 +103,45 @@ def test_a_limit_of_another_type_is_refused(chain: Chain) -> None:
     assert get(chain, LINEAR) == [1.0]
 
 
-@pytest.mark.parametrize(("given", "code"), [("0.2", None), ("3.0", 2), ("fast", 2)])
-def test_a_limit_at_the_start(
+LOOP = {"mux": {"sources": {"loop": {"topic": "/robot1/cmd_vel", "priority": 9, "timeout_s": 0.3}}}}
+STARTS: tuple[tuple[list[str], Mapping[str, Any], int | None, str], ...] = (
+    (["--ros-args", "-p", f"{LINEAR}:=0.2"], {}, None, "speed limit 0.2 m/s"),
+    (["--ros-args", "-p", f"{LINEAR}:=3.0"], {}, 2, LINEAR),
+    (["--ros-args", "-p", f"{LINEAR}:=fast"], {}, 2, LINEAR),
+    (["--ros-args", "-p", "use_sim_time:=true"], {}, 2, "use_sim_time is refused"),
+    (["--ros-args", "-p", "use_sim_time:=3"], {}, 2, "use_sim_time"),
+    (
+        ["--namespace", "robot1"],
+        LOOP,
+        2,
+        "mux.sources.loop: its topic is /robot1/cmd_vel here, an output of this robot",
+    ),
+)
+"""Words of the command, changes of robot.yaml, exit code (None: it runs), and what it reports."""
+
+
+def test_a_limit_holds_from_the_start_and_wrong_arguments_end_it_with_their_reason(
     spawn: Callable[..., Process],
     make_robot: Callable[[Mapping[str, Any]], Path],
     test_node: TestNode,
-    given: str,
-    code: int | None,
+    short_folder: Path,
 ) -> None:
-    words = ["velocity", "--config", str(make_robot({})), "--ros-args", "-p", f"{LINEAR}:={given}"]
-    process = spawn([sys.executable, "-m", "canbase_cli", *words])
-    told = "speed limit 0.2 m/s" if code is None else LINEAR
-    test_node.wait_for(lambda: told in process.log(), 30.0, "a line about it")
-    if code is not None:
-        test_node.wait_for(lambda: process.exit_code is not None, 30.0, "its end")
-    assert process.exit_code == code
-    assert "Traceback" not in process.log()
+    processes = []
+    for number, (words, changes, _, _) in enumerate(STARTS):
+        folder = short_folder / str(number)
+        path = make_robot({**changes, "lease": {"socket": str(folder / "lease")}})
+        argv = [sys.executable, "-m", "canbase_cli", "velocity", "--config", str(path), *words]
+        processes.append(spawn(argv, env=clear_records(folder, "robot")))
 
+    def codes() -> list[int | None]:
+        return [process.exit_code for process in processes]
 
-def test_a_parameter_of_another_type_ends_the_start_with_a_sentence(
-    spawn: Callable[..., Process], make_robot: Callable[[Mapping[str, Any]], Path], test_node: TestNode
-) -> None:
-    words = ["velocity", "--config", str(make_robot({})), "--ros-args", "-p", "use_sim_time:=3"]
-    process = spawn([sys.executable, "-m", "canbase_cli", *words])
-    test_node.wait_for(lambda: process.exit_code is not None, 30.0, "its end")
-    assert process.exit_code == 2
-    assert "use_sim_time" in process.log()
-    assert "Traceback" not in process.log()
+    def are_as_expected() -> bool:
+        reported = all(text in process.log() for process, (*_, text) in zip(processes, STARTS, strict=True))
+        return reported and codes() == [code for _, _, code, _ in STARTS]
+
+    test_node.wait_for(are_as_expected, 30.0, "the lines and exit codes")
+    assert not [process.log() for process in processes if "Traceback" in process.log()]
 
 
 @pytest.mark.usefixtures("domain_id")

@@ -11,11 +11,10 @@ from typing import Any
 
 import pytest
 from canbase.msg import MuxState, SafetyState
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import TwistStamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool, Int8
-from std_srvs.srv import Trigger
 
 from ros.conftest import MakeRobot, Spawn
 from support.ros_harness import Process, TestNode
@@ -23,6 +22,14 @@ from support.scanner import BEAMS, all_around
 from support.velocity_chain import LATCHED, RUN, START_S, Chain, drive, scan
 
 pytestmark = pytest.mark.ros
+Start = Callable[[Mapping[str, Any]], Chain]
+
+
+@pytest.fixture
+def chain(module_chain: Chain) -> Chain:
+    """At rest. A test that ends its process starts another one."""
+    module_chain.rest()
+    return module_chain
 
 
 def test_the_higher_priority_drives_and_silence_ends_in_explicit_zeros(chain: Chain) -> None:
@@ -30,6 +37,9 @@ def test_the_higher_priority_drives_and_silence_ends_in_explicit_zeros(chain: Ch
     chain.action.message = drive(0.2, 0.1)
     chain.wait_for_order(0.2)
     assert chain.ordered == pytest.approx((0.2, 0.1))
+    order = chain.orders.messages[-1]
+    assert order.header.frame_id == "base_link"
+    assert abs(time.time() - (order.header.stamp.sec + order.header.stamp.nanosec * 1e-9)) < 2.0
     chain.joystick.message = drive(-0.3)
     assert chain.wait_for_order(-0.3) < 0.5
     chain.node.wait_for(lambda: chain.mux.messages[-1].active == "joystick", 1.0, "the state")
@@ -55,57 +65,21 @@ def test_the_higher_priority_drives_and_silence_ends_in_explicit_zeros(chain: Ch
     assert chain.mux.messages[-1].active == ""
 
 
-def test_orders_carry_the_base_frame_and_a_stamp_of_their_own(chain: Chain) -> None:
-    chain.action.message = drive(0.2)
-    chain.wait_for_order(0.2)
-    order = chain.orders.messages[-1]
-    assert order.header.frame_id == "base_link"
-    stamp_s = order.header.stamp.sec + order.header.stamp.nanosec * 1e-9
-    assert abs(time.time() - stamp_s) < 2.0
-
-
 def test_a_source_faster_than_the_timer_is_not_doubled(chain: Chain) -> None:
-    chain.node.node.destroy_publisher(chain.joystick.publisher)
-    fast = chain.node.repeat(TwistStamped, "cmd_vel_joy", 100.0)
-    chain.node.wait_for_subscriber(fast.publisher)
-    chain.node.spin_for(1.0)  # the mux has seen that another one took its place
-    chain.node.release(fast)
-    fast.message = drive(0.2)
+    sent: list[TwistStamped] = []
+
+    def send() -> None:
+        sent.append(drive(0.2))
+        chain.joystick.publisher.publish(sent[-1])
+
+    timer = chain.node.node.create_timer(0.01, send)
     chain.wait_for_order(0.2)
     chain.orders.clear()
-    sent_before = fast.sent
+    sent.clear()
     chain.node.spin_for(2.0)
+    chain.node.node.destroy_timer(timer)
     assert chain.ordered == pytest.approx((0.2, 0.0))
-    assert len(chain.orders.messages) <= 1.3 * (fast.sent - sent_before)  # with the timers' 2 × 50 Hz it were twice
-
-
-def test_nan_is_refused_and_counted(chain: Chain) -> None:
-    chain.joystick.message = drive(math.nan)
-    chain.node.wait_for(lambda: any(source.refused for source in chain.mux.messages[-1].sources), 3.0, "a refusal")
-    assert chain.ordered == (0.0, 0.0)
-
-
-def test_a_plain_twist_drives_beside_stamped_sources(start: Callable[[Mapping[str, Any]], Chain]) -> None:
-    sources = {
-        "joystick": {"topic": "cmd_vel_joy", "priority": 100, "timeout_s": 0.3},
-        "teleop": {"topic": "cmd_vel_teleop", "priority": 60, "timeout_s": 0.3, "stamped": False},
-        "action": {"topic": "cmd_vel_action", "priority": 40, "timeout_s": 0.3},
-    }
-    chain = start({"mux": {"sources": sources}})
-    teleop = chain.node.source("cmd_vel_teleop", Twist)
-    teleop.message = drive(0.25).twist
-    chain.wait_for_order(0.25)
-
-
-def reset(chain: Chain) -> tuple[bool, str]:
-    """The answer of safety_filter/reset."""
-    client = chain.node.node.create_client(Trigger, "safety_filter/reset")
-    chain.node.wait_for(client.service_is_ready, START_S, "safety_filter/reset")
-    future = client.call_async(Trigger.Request())
-    chain.node.wait_for(future.done, 3.0, "an answer of safety_filter/reset")
-    answer = future.result()
-    assert answer is not None
-    return answer.success, answer.message
+    assert len(chain.orders.messages) <= 1.3 * len(sent)  # with the timers' 2 × 50 Hz it were twice
 
 
 def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wants_to_drive(chain: Chain) -> None:
@@ -115,18 +89,18 @@ def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wa
     state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
     assert (state.estop, state.emergency) == (True, True)
     assert chain.ordered == (0.0, 0.0)
-    assert reset(chain) == (False, "refused: the emergency stop on estop_state is pressed")
+    assert chain.reset() == (False, "refused: the emergency stop on estop_state is pressed")
     chain.estop.message = Bool(data=False)
     chain.orders.clear()
     chain.node.spin_for(0.3)
     assert {message.twist.linear.x for message in chain.orders.messages} == {0.0}  # no jump at release
     chain.joystick.message = drive(0.0)  # it has priority: cmd_vel_mux is zero, and the action wants to drive still
     chain.node.spin_for(0.2)
-    done, sentence = reset(chain)
+    done, sentence = chain.reset()
     assert (done, sentence.split(";")[0]) == (False, "refused: action orders a velocity")
     chain.action.message = drive(0.0)
     chain.node.spin_for(0.2)
-    assert reset(chain)[0] is True
+    assert chain.reset()[0] is True
     chain.wait_for_cause(SafetyState.CAUSE_NONE)
     chain.node.spin_for(0.1)  # the action's zero after the reset
     chain.action.message, chain.joystick.message = drive(0.2), None
@@ -134,7 +108,7 @@ def test_the_emergency_stop_stops_until_a_reset_that_is_refused_while_anybody_wa
 
 
 def test_a_button_that_publishes_another_type_holds_the_base(chain: Chain) -> None:
-    with TestNode("button") as button:
+    with chain.another("button") as button:
         button.node.create_publisher(Int8, "estop_state", 1).publish(Int8(data=1))
         state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
         assert "publishes it as std_msgs/msg/Int8, which is not received" in state.detail
@@ -163,10 +137,10 @@ def test_a_second_button_on_the_topic_of_the_emergency_stop_does_not_release_the
     other.publish(Bool(data=True))
     state = chain.wait_for_cause(SafetyState.CAUSE_ESTOP)
     chain.node.spin_for(0.5)
-    done, sentence = reset(chain)
+    done, sentence = chain.reset()
     assert (done, "estop_state has 2 publishers" in sentence) == (False, True), sentence
     chain.node.node.destroy_publisher(other)
-    chain.node.wait_for(lambda: reset(chain)[0], 5.0, "a reset with one button left")
+    chain.node.wait_for(lambda: chain.reset()[0], 5.0, "a reset with one button left")
     state = chain.wait_for_cause(SafetyState.CAUSE_NONE)
     assert not state.estop
 
@@ -247,14 +221,12 @@ def test_every_order_has_its_lease_in_rising_sequence(chain: Chain) -> None:
     assert chain.state.messages[-1].lease_sequence >= sequences[-1]
 
 
-@pytest.mark.parametrize("ask", [Process.terminate, Process.interrupt])
-def test_sigterm_and_sigint_end_with_zeros_until_the_base_can_stand(
-    chain: Chain, ask: Callable[[Process], None]
-) -> None:
+def test_sigint_ends_with_zeros_until_the_base_can_stand(start: Start) -> None:
+    chain = start({})
     chain.action.message = drive(0.5)
     chain.wait_for_order(0.5)
     asked_s = time.monotonic()
-    ask(chain.process)
+    chain.process.interrupt()
     chain.node.wait_for(lambda: chain.process.exit_code is not None, 5.0, "its end")
     ended_s = time.monotonic()
     assert chain.process.exit_code == 0, chain.process.log()
@@ -308,11 +280,8 @@ def test_a_namespace_gives_a_second_robot(
 
 
 # drives at 0.8 m/s ── SIGTERM ── 0.2: the button is pressed, which it publishes once ── 1.2: the end ── start: pressed
-@pytest.mark.parametrize("spoke", [True, False], ids=["a button in use", "its first message"])
-def test_a_press_during_the_orderly_end_outlives_it(chain: Chain, spawn: Spawn, robot_yaml: Path, spoke: bool) -> None:
-    if spoke:
-        chain.estop.publisher.publish(Bool(data=False))
-        chain.node.spin_for(0.2)
+def test_a_press_during_the_orderly_end_outlives_it(start: Start, spawn: Spawn, robot_yaml: Path) -> None:
+    chain = start({})
     chain.joystick.message = drive(0.8)
     chain.wait_for_order(0.8)
     chain.process.terminate()
@@ -328,7 +297,7 @@ def test_a_press_during_the_orderly_end_outlives_it(chain: Chain, spawn: Spawn, 
     spawn(RUN.format(path=str(robot_yaml), ros_args=[]))
     chain.node.wait_for(lambda: chain.state.last, START_S, "the next start")
     assert "not seen released" in chain.wait_for_cause(SafetyState.CAUSE_ESTOP).detail
-    assert reset(chain)[0] is False
+    assert chain.reset()[0] is False
     chain.orders.clear()
     chain.node.release(chain.joystick)
     chain.joystick.message = drive(0.8)
@@ -340,7 +309,7 @@ def test_a_press_during_the_orderly_end_outlives_it(chain: Chain, spawn: Spawn, 
 def test_two_scanners_on_one_topic_stop_the_base_with_their_names(chain: Chain) -> None:
     chain.joystick.message = drive(0.3)
     chain.wait_for_order(0.3)
-    with TestNode("rear_scanner") as other:
+    with chain.another("rear_scanner") as other:
         other.node.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
         chain.wait_for_cause(SafetyState.CAUSE_SCAN_INVALID, "2 publishers (/rear_scanner, /test_node)")
         chain.wait_for_order(0.0)

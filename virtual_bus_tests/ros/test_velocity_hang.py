@@ -12,25 +12,22 @@ from support.velocity_chain import Chain, drive
 pytestmark = pytest.mark.ros
 
 
-def test_a_process_that_hangs_falls_silent_on_cmd_vel_and_at_the_watchdog(chain: Chain) -> None:
-    chain.action.message = drive(0.2)
-    chain.wait_for_order(0.2)
-    chain.process.stop()
-    chain.node.spin_for(0.2)
-    chain.drain()
-    chain.leases.clear()
-    chain.orders.clear()
-    chain.node.spin_for(0.5)
-    assert chain.orders.messages == []
-    assert chain.leases == []
+@pytest.fixture
+def chain(module_chain: Chain) -> Chain:
+    module_chain.rest()
+    return module_chain
 
 
-def test_a_command_that_waited_meanwhile_moves_nothing_after(chain: Chain) -> None:
+def test_a_process_that_hangs_is_silent_and_a_command_that_waited_meanwhile_moves_nothing_after(chain: Chain) -> None:
     chain.joystick.message = drive(0.0)
     chain.node.spin_for(0.3)
     chain.process.stop()
     chain.joystick.message = drive(0.3)
-    chain.node.spin_for(1.0)
+    chain.node.spin_for(0.2)
+    chain.orders.clear()
+    chain.leases.clear()
+    chain.node.spin_for(0.8)
+    assert (chain.orders.messages, chain.leases) == ([], [])
     chain.joystick.message = None  # its last 50 commands wait in the sockets of the process, the newest in its queue
     chain.node.spin_for(0.5)
     chain.orders.clear()
