@@ -27,12 +27,3 @@ def test_drives_alone_are_read_and_one_that_goes_is_named(tmp_path: Path) -> Non
     assert broken.returncode == 1
     assert "The first check that fails: node 2 (right_wheel)" in broken.stdout
     assert "\x1b[" not in broken.stdout
-
-
-def test_a_drive_that_does_not_stop_by_itself_is_a_warning(tmp_path: Path) -> None:
-    config = write_robot(tmp_path, free_udp_port(), profile="roboteq", velocity_unit="rpm")
-    with drives(config):
-        done = canbase("doctor", "--config", str(config), "--json")
-    rows = {row["name"]: row for row in json.loads(done.stdout)}
-    assert rows["node 1 (left_wheel): stops by itself"]["verdict"] == "warn"
-    assert "only STO by a safety relay" in rows["node 1 (left_wheel): stops by itself"]["advice"]
