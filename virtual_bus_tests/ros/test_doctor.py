@@ -1,4 +1,7 @@
-"""`canbase doctor` as a command, on a system that really runs: broken in eight ways, it names what is broken."""
+"""`canbase doctor` as a command sees a system that really runs: goals, log, graph, processes and answers.
+
+What it makes of that: unit/doctor/test_symptoms.py.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +28,6 @@ DOCTOR = (
     "from canbase_cli.main import app\napp(prog_name='canbase')\n"
 )
 """`canbase` on a computer with nothing else to do, whatever this one has: a doctor on a busy one judges no times."""
-BLOCKS = (
-    "import time\nfrom canbase_action_server.node import DriveDistanceServer\n"
-    "sound = DriveDistanceServer.look_at_the_clock\n"
-    "def look(self, now_s):\n    time.sleep(0.2)\n    sound(self, now_s)\n"
-    "DriveDistanceServer.look_at_the_clock = look\n"
-)
-"""A server whose thread is blocked for ten control cycles in each turn, also at rest."""
 LEAVES = (
     "import rclpy\nfrom canbase_action_server.client import DriveClient\n"
     "rclpy.init()\nnode = rclpy.create_node('leaves')\n"
@@ -116,13 +112,11 @@ def test_nothing_fails_on_a_robot_that_is_well_and_doctor_leaves_its_goal_alone(
     healthy.node.wait_for(lambda: healthy.base.speed_mps > 0.08, 10.0, "the base to move")
     assert [row for row in healthy.doctor() if row["verdict"] != "ok"] == []
     assert [row["verdict"] for row in healthy.doctor("--symptom", "no-feedback")] == ["ok"] * 3
-    assert [row["verdict"] for row in healthy.doctor("--symptom", "no-result")] == ["ok"] * 3
     assert goal.exit_code is None
     assert healthy.base.speed_mps == pytest.approx(0.1, abs=0.02)
 
 
-def test_not_listed_a_doctor_in_another_domain_or_namespace_is_told_so(healthy: Clinic) -> None:
-    assert healthy.first_failure("not-listed", "--namespace", "robot9") == "name and namespace"
+def test_not_listed_a_doctor_in_another_domain_is_told_so(healthy: Clinic) -> None:
     with own_domain() as elsewhere:
         env = {"ROS_DOMAIN_ID": str(elsewhere)}
         process = Process(
@@ -133,51 +127,28 @@ def test_not_listed_a_doctor_in_another_domain_or_namespace_is_told_so(healthy: 
     assert "The first check that fails: domain and network" in process.log()
 
 
-def test_rejected_the_range_or_what_keeps_the_robot_from_starting(healthy: Clinic) -> None:
+def test_rejected_the_range_of_the_goal(healthy: Clinic) -> None:
     assert healthy.end(healthy.spawn([*CANBASE, "drive", "100"])) == 5
     assert healthy.first_failure("rejected") == "range of the goal"
-    assert healthy.end(healthy.spawn([*CANBASE, "drive", "nan"])) == 5
-    assert healthy.first_failure("rejected") == "NaN and infinity"
-    healthy.base.mux.active = "joystick"
-    assert healthy.end(healthy.spawn([*CANBASE, "drive", "1"])) == 5
-    assert healthy.first_failure("rejected") == "busy, or not safe to start"
 
 
 def test_no_feedback_the_client_has_gone(healthy: Clinic) -> None:
-    assert healthy.first_failure("no-feedback") == "a goal executes"
     assert healthy.end(healthy.spawn(python_argv(LEAVES))) == 0
     assert healthy.first_failure("no-feedback") == "a client listens"
 
 
-def test_slow_cancel_and_no_result_a_callback_blocks_and_then_the_server_hangs(healthy: Clinic) -> None:
-    slow = healthy.spawn([*python_argv(BLOCKS + server_code(healthy.config)), "--ros-args", "-r", "__ns:=/slow"])
-    healthy.node.wait_for(lambda: healthy.node.node.count_publishers("/slow/cmd_vel_action"), 20.0, "the slow server")
-    assert healthy.first_failure("slow-cancel", "--namespace", "slow") == "no blocking work"
-    slow.stop()
-    assert healthy.first_failure("no-result", "--namespace", "slow") == "the server answers"
-    slow.kill()
-
-
-def test_moves_after_cancel_another_source_drives(healthy: Clinic) -> None:
-    healthy.base.mux.active = "joystick"
-    assert healthy.first_failure("moves-after-cancel") == "who owns the base"
-
-
-def test_only_in_simulation_the_stamps_are_of_another_clock(healthy: Clinic) -> None:
-    healthy.base.clock_off_s = -1e6
-    assert healthy.first_failure("only-in-simulation") == "odometry"
+def test_no_result_the_server_hangs(healthy: Clinic) -> None:
+    healthy.server.stop()
+    try:
+        assert healthy.first_failure("no-result") == "the server answers"
+    finally:
+        healthy.server.resume()
 
 
 def test_goals_collide_two_servers_for_one_base(healthy: Clinic) -> None:
     second = healthy.spawn(python_argv(server_code(healthy.config)))
     healthy.node.wait_for(lambda: healthy.node.node.count_publishers("cmd_vel_action") == 2, 20.0, "a second server")
     # The doctor waits until it has found one server; DDS may tell of another one seconds later.
-    assert healthy.first_failure("goals-collide", "--seconds", "5") == "one server"
+    assert healthy.first_failure("goals-collide", "--seconds", "3") == "one server"
     second.terminate()
     assert second.wait(5.0) == 0
-
-
-def test_an_unknown_symptom_is_a_wrong_command_line_that_names_the_known_ones(healthy: Clinic) -> None:
-    process = healthy.spawn([*CANBASE, "doctor", "--symptom", "sad"])
-    assert healthy.end(process) == 2
-    assert "goals-collide" in process.log()

@@ -18,10 +18,11 @@ from support.running_robot import READY_S, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 
-TRIALS = 20
+TRIALS = 3
 STOP_S = 0.25
 """A loaded machine answers within this; `canbase prove benchmark stop` measures it."""
-PAUSE_S = 3.0
+PAUSE_S = 1.2
+"""Longer than any request may wait, and than the watchdog waits for the driver."""
 CUT_NODE = 1
 
 
@@ -136,9 +137,7 @@ def test_a_stop_is_answered_and_obeyed_while_a_reset_waits_for_an_absent_drive(s
         reset = services.waiting_reset()
         taken_s.append(services.timed_stop())
         assert services.answer(reset, 1.0).message == "broken off: service motor_driver/stop"
-    taken_s.sort()
-    print(f"stop during a reset: p50 {1e3 * taken_s[TRIALS // 2]:.1f} ms, max {1e3 * taken_s[-1]:.1f} ms")
-    assert taken_s[-1] < STOP_S
+    assert max(taken_s) < STOP_S
     services.wait_cause("stop requested")
 
 

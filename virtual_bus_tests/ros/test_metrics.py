@@ -27,7 +27,7 @@ from support.surroundings import World
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(180)]
 
 PATIENCE_S = 30.0
-STORM = 300
+STORM = 60
 """Requests."""
 
 

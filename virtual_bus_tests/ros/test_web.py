@@ -9,7 +9,6 @@ import contextlib
 import math
 import os
 import random
-import resource
 import signal
 import socket
 import subprocess
@@ -212,12 +211,14 @@ def test_whatever_lets_go_of_hold_to_drive_stops_the_base_as_fast_as_a_joystick_
     found = {}
     for way in ("the finger", "the page", "the network", "a browser that hangs", "a browser that is killed"):
         with ExitStack() as after:
-            address, leader = _browser(after)
-            page = _driving(site, address, after)
+            player, leader = _browser(site, after) if "browser" in way else (site.browser, 0)
+            page = _driving(site, player)
             began_s = time.monotonic()
             _let_go(way, page, leader, after)
             site.robot.wait_standing()
             found[way] = site.robot.standstill_after(began_s).after_s
+            if player is site.browser:
+                page.context.close()
     print(f"a joystick that goes silent: {silent_s:.3f} s; {found}")
     assert max(found.values()) <= silent_s + LATE_S, found
 
@@ -233,10 +234,8 @@ def _joystick_silent(site: Site) -> float:
     return site.robot.standstill_after(began_s).after_s
 
 
-def _driving(site: Site, address: str, after: ExitStack) -> Any:
+def _driving(site: Site, player: Any) -> Any:
     """A page in that browser whose finger is on the key for forward; the base drives."""
-    player = site.browser.browser_type.connect_over_cdp(address)
-    after.callback(_close, player)
     page = player.new_context().new_page()
     page.goto(f"{site.url}/?token={TOKEN}")
     page.goto(f"{site.url}/drive")
@@ -252,8 +251,8 @@ def _driving(site: Site, address: str, after: ExitStack) -> Any:
     return page
 
 
-def _browser(after: ExitStack) -> tuple[str, int]:
-    """The address for its control, and its process group, which can be stopped and killed."""
+def _browser(site: Site, after: ExitStack) -> tuple[Any, int]:
+    """One more, and its process group, which can be stopped and killed."""
     port = free_tcp_port()
     folder = after.enter_context(TemporaryDirectory(prefix="canbase-chromium-", ignore_cleanup_errors=True))
     options = ("--headless", "--no-sandbox", f"--remote-debugging-port={port}", f"--user-data-dir={folder}")
@@ -269,7 +268,9 @@ def _browser(after: ExitStack) -> tuple[str, int]:
             assert time.monotonic() < end_s
             time.sleep(0.05)
         else:
-            return f"http://127.0.0.1:{port}", process.pid
+            player = site.browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port}")
+            after.callback(_close, player)
+            return player, process.pid
 
 
 def _signal(leader: int, number: signal.Signals) -> None:
@@ -371,7 +372,7 @@ def test_the_health_page_shows_the_doctors_rows(site: Site) -> None:
 
 
 def test_who_is_not_let_in_is_refused_and_the_robot_does_not_notice(site: Site) -> None:
-    """Wrong tokens, other sites, huge messages, a thousand connections; meanwhile the robot is enabled and punctual."""
+    """Wrong tokens, other sites, huge messages; meanwhile the robot is enabled and punctual."""
     before, began_s = site.robot.wait_any_state(), time.monotonic()
     session = _session(site)
     mine = f"Host: 127.0.0.1:{site.port}\r\nCookie: {COOKIE.format(port=site.port)}={session}\r\n"
@@ -388,16 +389,8 @@ def test_who_is_not_let_in_is_refused_and_the_robot_does_not_notice(site: Site) 
     assert _status(site, "GET /hold", mine + upgrade + f"Origin: {site.url}\r\n") == 403, "it has no ticket"
     assert _status(site, "POST /stop", mine + "Content-Length: 99999999\r\n") == 413
     assert _status(site, "GET /docs", mine) == 404
-    with ExitStack() as held:
-        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)  # 1024 of most users, and this process has other files
-        resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, 4096), hard), hard))
-        held.callback(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
-        for _ in range(1000):
-            connection = socket.create_connection(("127.0.0.1", site.port), 5.0)
-            held.callback(connection.close)
-        assert _status(site, "GET /", mine) == 200, "those that say nothing keep nobody out"
-        with contextlib.suppress(ConnectionError):  # while it is being sent
-            assert _status(site, "GET /", mine + "".join(f"X-{i}: {'a' * 1000}\r\n" for i in range(2000))) == 400
+    with contextlib.suppress(ConnectionError):  # while it is being sent
+        assert _status(site, "GET /", mine + "".join(f"X-{i}: {'a' * 1000}\r\n" for i in range(2000))) == 400
     after = site.robot.wait_any_state()
     assert (after.state, after.watchdog_trips) == (before.state, before.watchdog_trips)
     cycles = (time.monotonic() - began_s) * site.robot.robot.rates.control_hz

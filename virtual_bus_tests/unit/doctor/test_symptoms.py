@@ -15,11 +15,13 @@ from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
+from typer.testing import CliRunner
 
 from canbase_action_server.along_track import Pose
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Driver, Inputs, Mux, Safety
 from canbase_action_server.inputs import Odometry as OdometryInput
+from canbase_cli.main import app
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_doctor.check import INCONCLUSIVE, Verdict, exit_code, first_failure
@@ -378,3 +380,8 @@ def test_what_no_load_explains_fails_on_an_overloaded_computer_too(symptom: str,
 )
 def test_what_an_overload_is(overload: Overload, is_one: bool) -> None:
     assert bool(overload.sentence) is is_one
+
+
+def test_an_unknown_symptom_is_a_wrong_command_line_that_names_the_known_ones() -> None:
+    done = CliRunner().invoke(app, ["doctor", "--symptom", "sad"], env={"COLUMNS": "200"})
+    assert (done.exit_code, "goals-collide" in done.output) == (2, True)
