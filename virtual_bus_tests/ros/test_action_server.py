@@ -1,7 +1,6 @@
 """The action server as a process, over DDS, before a base of the test: what arrives, what is answered, how it ends.
 
-Which code a goal ends with is decided in virtual time (unit/action_server), and shown on a whole robot in
-test_stack_error_codes.py.
+Which code a goal ends with: unit/action_server, unit/chain/test_goal_codes.py; on a whole robot: test_stack_topics.py.
 """
 
 from __future__ import annotations
@@ -48,6 +47,12 @@ def test_by_default_nav2_has_its_names_for_itself(stage: GoalStage) -> None:
     stage.client.wait_for_server(PATIENT_S)
     names = ("drive_distance", "rotate_angle", "drive_on_heading", "backup", "spin")
     assert [stage.node.node.count_services(f"{name}/_action/send_goal") for name in names] == [1, 1, 0, 0, 0]
+
+
+def test_the_base_of_the_tests_goes_on_while_its_test_is_busy(stage: GoalStage) -> None:
+    drive = stage.client.send(0.3, 0.3)
+    time.sleep(0.8)  # longer than any state may be old
+    assert stage.end_of(drive).code is ErrorCode.OK
 
 
 def test_a_pose_that_is_set_anew_by_less_than_a_jump_ends_the_goal(stage: GoalStage) -> None:
@@ -235,19 +240,23 @@ def test_of_many_goals_at_once_one_is_accepted_the_others_find_it_busy_and_the_n
     assert stage.end_of(stage.client.send(-0.1, 0.2)).code is ErrorCode.OK
 
 
-def test_a_server_that_is_interrupted_stops_the_base_and_delivers_the_result() -> None:
-    with goal_stage() as stage:  # test_stack_error_codes.py has SIGTERM
+def test_a_server_that_is_told_to_end_stops_the_base_and_delivers_the_result() -> None:
+    with goal_stage() as stage:
         drive = stage.drive_until_moving()
-        stage.server.interrupt()
+        stage.server.terminate()
         result = stage.end_of(drive)
         assert (result.status, result.code) == (Status.ABORTED, ErrorCode.SHUTDOWN)
         assert stage.server.wait(5.0) == 0
 
 
-def test_a_server_without_a_goal_ends_at_once() -> None:
+def test_a_server_without_a_goal_that_is_interrupted_ends_at_once() -> None:
     with goal_stage() as stage:
-        stage.server.terminate()
+        stage.server.interrupt()
         assert stage.server.wait(3.0) == 0
+
+
+def drives(stage: GoalStage) -> Drive:
+    return stage.drive_until_moving()
 
 
 def second_goal(stage: GoalStage) -> Drive:
@@ -276,6 +285,12 @@ RAISES = "def broken(*_args): raise ZeroDivisionError('a defect')\n"
     ("sabotage", "provoke"),
     [
         (
+            "from canbase_action_server.goal import GoalRun\n"
+            "sound = GoalRun.tick\n"
+            "GoalRun.tick = lambda self, *args: broken() if self.traveled_m > 0.1 else sound(self, *args)\n",
+            drives,
+        ),
+        (
             "from canbase_action_server.goal_queue import GoalQueue\n"
             "sound = GoalQueue.refusal\n"
             "GoalQueue.refusal = lambda self, *args: broken() if self.busy else sound(self, *args)\n",
@@ -287,7 +302,7 @@ RAISES = "def broken(*_args): raise ZeroDivisionError('a defect')\n"
         ),
         ("from canbase_action_server import drive_messages\ndrive_messages._result = broken\n", to_its_end),
     ],
-    ids=["goal", "cancel", "result"],
+    ids=["tick", "goal", "cancel", "result"],
 )
 def test_a_defect_in_a_callback_stops_the_base_ends_the_goal_as_internal_and_the_process(
     sabotage: str, provoke: Callable[[GoalStage], Drive]
@@ -295,6 +310,7 @@ def test_a_defect_in_a_callback_stops_the_base_ends_the_goal_as_internal_and_the
     with goal_stage(sabotage=RAISES + sabotage) as stage:
         result = stage.end_of(provoke(stage))
         assert (result.status, result.code) == (Status.ABORTED, ErrorCode.INTERNAL)
+        assert "ZeroDivisionError" in result.message or provoke is to_its_end
         assert stage.server.wait(5.0) == 1
         assert "a defect" in stage.server.log()
 

@@ -93,6 +93,7 @@ def test_60_goals_and_cancels_of_several_clients_each_end_once_and_rightly() -> 
         }
         ends = {uuid: crowd.end(uuid) for uuid in crowd.handles}
         assert {uuid: end for uuid, end in ends.items() if uuid not in allowed.get(end, set())} == {}
+        assert (Status.ABORTED, ErrorCode.PREEMPTED) in ends.values()
         assert one_at_a_time(crowd.stage.steps())
         assert len(crowd.handles) > 10
         assert crowd.node.node.count_publishers("cmd_vel_action") == 1
