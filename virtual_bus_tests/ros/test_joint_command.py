@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 from canbase.msg import MuxSource, MuxState
-from geometry_msgs.msg import TwistStamped
-from sensor_msgs.msg import JointState
 
-from support.ros_harness import Recorder, TestNode
+from support.ros_harness import Recorder
 from support.running_robot import LATCHED, PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
 from support.topic_hardware import TopicHardware
 
@@ -84,33 +81,6 @@ def test_a_controller_drives_and_reads_its_wheels_and_the_base_stops_when_its_pr
     robot.node.wait_for(lambda: control(mux).standing == MuxSource.SILENT, 5.0, "the mux to say so")
 
 
-def test_wheel_speeds_above_the_limits_are_limited_as_those_of_every_source(
-    robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
-) -> None:
-    wait_followed(robot, mux)
-    orders = robot.node.record(TwistStamped, "cmd_vel")
-    hardware.set(1000.0, 1000.0)
-    limit_mps = robot.robot.limits.linear_mps
-    robot.node.wait_for(lambda: orders.last is not None and orders.last.twist.linear.x > 0.0, 5.0, "an order")
-    robot.node.spin_for(0.3)
-    hardware.set(0.0, 0.0)
-    assert max(order.twist.linear.x for order in orders.messages) <= limit_mps + 1e-9
-    robot.wait_standing()
-
-
-def test_the_joystick_takes_over_and_a_controller_that_has_kept_its_speed_drives_on(
-    robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
-) -> None:
-    joystick = robot.node.source("cmd_vel_joy")
-    wait_followed(robot, mux)
-    hardware.set(1.0, 1.0)
-    robot.wait_speed(0.09)
-    joystick.message = TwistStamped()
-    robot.wait_standing()
-    joystick.message = None
-    robot.wait_speed(0.09)
-
-
 def test_a_controller_that_begins_with_a_speed_is_followed_after_zero(
     robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
 ) -> None:
@@ -121,43 +91,6 @@ def test_a_controller_that_begins_with_a_speed_is_followed_after_zero(
     wait_followed(robot, mux)
     hardware.set(1.0, 1.0)
     robot.wait_speed(0.09)
-
-
-def test_hardware_with_its_default_threshold_shows_no_zero_and_moves_nothing(
-    robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
-) -> None:
-    wait_followed(robot, mux)
-    hardware.threshold = 1e-5  # canbase print urdf writes -1
-    robot.node.wait_for(lambda: control(mux).standing == MuxSource.SILENT, 10.0, f"its silence at rest: {mux.last}")
-    sent = hardware.sent
-    robot.node.spin_for(0.5)
-    assert hardware.sent == sent  # at rest it publishes nothing: no zero arms the source after its next restart
-    hardware.publisher = restarted(robot, mux, hardware)
-    hardware.set(1.0, 1.0)
-    robot.node.wait_for(lambda: control(mux).standing == MuxSource.UNARMED, 10.0, f"not followed: {mux.last}")
-    assert robot.moved_since(time.monotonic(), 0.5) < RESTS_M
-
-
-def restarted(robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware) -> Any:
-    """The publisher of a new controller manager, when the mux has seen that the one before is gone."""
-    robot.node.node.destroy_publisher(hardware.publisher)
-    robot.node.wait_for(lambda: not control(mux).armed, 10.0, "the mux to see that it is gone")
-    publisher = robot.node.node.create_publisher(JointState, TOPIC, 1)
-    robot.node.wait_for_subscriber(publisher)
-    return publisher
-
-
-def test_two_controller_managers_on_the_topic_stop_the_base(
-    robot: RunningRobot, mux: Recorder[MuxState], hardware: TopicHardware
-) -> None:
-    wait_followed(robot, mux)
-    hardware.set(1.0, 1.0)
-    robot.wait_speed(0.09)
-    with TestNode("second_manager", domain_id=int(robot.env["ROS_DOMAIN_ID"])) as second:
-        other = TopicHardware(second.node, ["left_wheel", "right_wheel"], TOPIC)
-        second.wait_for_subscriber(other.publisher)
-        robot.wait_standing()
-        robot.node.wait_for(lambda: "2 publishers on joint_command" in control(mux).reason, 10.0, f"why: {mux.last}")
 
 
 def test_a_message_without_a_wheel_or_with_nan_moves_nothing_and_is_counted_with_its_reason(

@@ -73,17 +73,13 @@ def container(started: Started) -> None:
 
 
 def launch(started: Started) -> None:
-    """As robot.launch.py starts its executables: they end with the process that started them."""
-    ros2_run(started, CANBASE_PARENT=str(os.getpid()))
-
-
-def ros2_run(started: Started, **environment: str) -> None:
+    """As robot.launch.py and ros2 run start the executables; those of the launch file end with the process that did."""
     for name in re.findall(r'_part\(\s*"([a-z_]+)"', (ROOT / "deploy/launch/robot.launch.py").read_text()):
         if name == "sim":
             continue
         executable = started.robot.folder / name
         executable.symlink_to(ROOT / "deploy" / "bin" / "node")
-        started.run(name, sys.executable, executable, "--config", started.robot.config, **environment)
+        started.run(name, sys.executable, executable, "--config", started.robot.config, CANBASE_PARENT=str(os.getpid()))
 
 
 def by_hand(started: Started) -> None:
@@ -119,14 +115,12 @@ def unit_command(robot: RunningRobot, part: str, directive: str) -> list[str]:
 
 
 SUPERVISORS: Final[dict[str, Callable[[Started], None]]] = {
-    "canbase up": up,
     "a container": container,
     "ros2 launch": launch,
-    "ros2 run": ros2_run,
     "systemd": systemd,
     "by hand": by_hand,
 }
-"""Whoever can start driver and watchdog."""
+"""Whoever can start driver and watchdog, besides `canbase up`: it is killed with them below."""
 
 
 @pytest.fixture

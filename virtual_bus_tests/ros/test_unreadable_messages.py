@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib
-import json
 import sys
 import time
 import urllib.error
@@ -93,14 +92,10 @@ def test_an_executor_drops_them(make: Callable[..., Executor], test_node: TestNo
 
 
 class Stranger:
-    """Publishes on the topics that metrics and vda5050 read: first what is no message, then a state."""
+    """Publishes on the topics that metrics read: first what is no message, then a state."""
 
     def __init__(self, test_node: TestNode) -> None:
         self._publishers = [(test_node.node.create_publisher(kind, topic, 10), kind) for topic, kind in TOPICS.items()]
-
-    @property
-    def is_received(self) -> bool:
-        return all(publisher.get_subscription_count() for publisher, _ in self._publishers)
 
     def publish(self, *, with_good: bool) -> None:
         for publisher, kind in self._publishers:
@@ -133,26 +128,4 @@ def test_metrics_go_on_and_count_them(spawn: Spawn, robot_yaml: Path, test_node:
 
     test_node.wait_for(counted, PATIENCE_S, f"the count of messages that are none: {process.log()}")
     test_node.wait_for(shown, PATIENCE_S, "the state after them")
-    assert process.exit_code is None
-
-
-def test_vda5050_goes_on(spawn: Spawn, robot_yaml: Path, test_node: TestNode) -> None:
-    process = spawn([*CANBASE, "vda5050", "--config", str(robot_yaml)])
-    stranger = Stranger(test_node)
-
-    def lines() -> list[Any]:
-        return [json.loads(line) for line in process.log().splitlines() if line.startswith("{")]
-
-    def written() -> bool:
-        stranger.publish(with_good=False)
-        return len(lines()) >= before + 3
-
-    def known() -> bool:
-        stranger.publish(with_good=True)
-        return "state_unknown" not in {error["errorType"] for error in lines()[-1]["errors"]}
-
-    test_node.wait_for(lambda: stranger.is_received, PATIENCE_S, "canbase vda5050")
-    before = len(lines())
-    test_node.wait_for(written, PATIENCE_S, "lines while nothing can be read")
-    test_node.wait_for(known, PATIENCE_S, "a state after what is none")
     assert process.exit_code is None

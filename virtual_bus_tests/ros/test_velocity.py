@@ -266,19 +266,6 @@ def test_an_exception_in_a_callback_ends_the_process_with_zeros_and_the_tracebac
     assert [message.twist.linear.x for message in chain.orders.messages[-3:]] == [0.0, 0.0, 0.0]
 
 
-def test_a_namespace_gives_a_second_robot(
-    spawn: Callable[..., Process], robot_yaml: Path, test_node: TestNode, watchdog: socket.socket
-) -> None:
-    spawn(RUN.format(path=str(robot_yaml), ros_args=["--ros-args", "-r", "__ns:=/robot2"]))
-    chain_of_the_other = test_node.record(TwistStamped, "/robot2/cmd_vel")
-    ours = test_node.record(TwistStamped, "/cmd_vel")
-    count = test_node.node.count_subscribers
-    test_node.wait_for(lambda: count("/robot2/cmd_vel_action") == count("/robot2/scan") == 1, START_S, "/robot2")
-    test_node.wait_for(lambda: len(chain_of_the_other.messages) > 5, START_S, "zeros of /robot2")
-    assert ours.messages == []
-    assert watchdog.recv(100).startswith(b"CBL1")
-
-
 # drives at 0.8 m/s ── SIGTERM ── 0.2: the button is pressed, which it publishes once ── 1.2: the end ── start: pressed
 def test_a_press_during_the_orderly_end_outlives_it(start: Start, spawn: Spawn, robot_yaml: Path) -> None:
     chain = start({})

@@ -1,8 +1,8 @@
 """A stand-in for ros2_control with joint_state_topic_hardware_interface 1.1.0, as its `read` and `write` are.
 
 It publishes the joints of its tag with the velocity commands that a controller has set, stamped now, at the rate of the
-controller manager, and takes the measured speeds from joint_states. As in the original it publishes nothing while the
-sum of the differences between commands and measured speeds is at most `threshold`: canbase print urdf writes -1.
+controller manager, and takes the measured speeds from joint_states. With the threshold -1, which canbase print urdf
+writes, the original publishes them also at rest.
 """
 
 from __future__ import annotations
@@ -22,12 +22,10 @@ RATE_HZ = 100.0
 class TopicHardware:
     """One <ros2_control> tag. `commands`: what its controller has set [rad/s]; `states`: what it has read."""
 
-    def __init__(self, node: Node, joints: Sequence[str], topic: str, threshold: float = -1.0) -> None:
+    def __init__(self, node: Node, joints: Sequence[str], topic: str) -> None:
         self.commands = dict.fromkeys(joints, 0.0)
         self.states = dict.fromkeys(joints, math.nan)
         self.alive = True
-        self.sent = 0
-        self.threshold = threshold
         self._node = node
         self.publisher = node.create_publisher(JointState, topic, 1)
         node.create_subscription(JointState, "joint_states", self._read, qos_profile_sensor_data)
@@ -44,10 +42,8 @@ class TopicHardware:
                 self.states[name] = velocity
 
     def _write(self) -> None:
-        apart = sum(abs(self.states[joint] - command) for joint, command in self.commands.items())
-        if not self.alive or apart <= self.threshold:
+        if not self.alive:
             return
         message = JointState(name=list(self.commands), velocity=list(self.commands.values()))
         message.header.stamp = self._node.get_clock().now().to_msg()
         self.publisher.publish(message)
-        self.sent += 1
