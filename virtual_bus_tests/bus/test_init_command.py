@@ -47,14 +47,15 @@ def test_a_person_is_asked_again_after_a_typing_mistake_and_ctrl_c_writes_nothin
 
 
 def answer_until_the_end(page: Page) -> None:
-    """Takes the proposed answers, and 20 where there is none."""
+    """Takes the proposed answers, and its own where there is none."""
     answered: set[str] = set()
 
     def answer() -> bool:
         for question in page.questions:
             if question["ask"] not in answered:
                 answered.add(question["ask"])
-                page.say(answer="20" if question["default"] is None else "", key=question["ask"])
+                own = "20" if question["ask"].endswith("gear_ratio") else "0.2"  # 0.2 m: where the scanner is
+                page.say(answer=own if question["default"] is None else "", key=question["ask"])
         return page.process.poll() is not None
 
     page.live_until(answer)
