@@ -131,9 +131,11 @@ def test_it_is_written_while_the_robot_drives_and_explain_export_and_replay_read
 
 
 def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(robot: RunningRobot) -> None:
+    before_s = time.time()
     robot.reset("motor_driver/stop")  # the recording has what follows: a reset, ENABLED, and the next stop
     robot.wait_state(DriverStatus.LATCHED)
-    began_s = at_speed(robot)
+    written(robot, "velocity_*.jsonl", before_s)
+    began_s, wall_s = at_speed(robot), time.time()
     assert robot.run("stop") == 0
     event = event_since(robot, began_s, "motor_driver")
     robot.wait_standing()
@@ -166,6 +168,7 @@ def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(ro
     assert (story.cause, story.caught_by) == (Cause.STOP_REQUESTED, "motor_driver")
     assert story.standstill.stood_s == pytest.approx(truth.after_s, abs=0.1)
     assert story.standstill.distance_m == pytest.approx(truth.way_m, abs=0.02)
+    is_decided_again_by_all_parts(robot, file, wall_s, "driver")
 
 
 def tells_all_that_was_ordered_and_what_became_of_it(events: list[dict[str, Any]]) -> None:
@@ -184,6 +187,20 @@ def tells_all_that_was_ordered_and_what_became_of_it(events: list[dict[str, Any]
     assert [state["state"] for state in by_kind["motor_driver/state"]][-2:] == ["ENABLED", "STOPPING"]
     assert [request["request"] for request in by_kind["request"]][-1] == "stop"
     assert by_kind["answer"][-1]["done"]
+
+
+def is_decided_again_by_all_parts(robot: RunningRobot, file: Path, since_s: float, cause: str) -> None:
+    """A stop since then (s since 1970): mux and filter decide the same from their file, all parts from both files."""
+    velocity = written(robot, "velocity_*.jsonl", since_s)
+    inputs = read_velocity(velocity)
+    assert inputs.head.cause == cause
+    found = replay_velocity(inputs)
+    assert found.agrees, (found.mux_differences[:2], found.filter_differences[:2])
+    assert found.decisions > 50
+    assert (cause == "estop") == ("estop" in [replayed.cause for _, replayed in causes(found)])
+    code, text = run("record", "replay", str(file), "--json")
+    assert code == 0, run("record", "replay", str(file))
+    assert json.loads(text)["velocity"]["source"] == velocity.name
 
 
 def written(robot: RunningRobot, pattern: str, since_s: float) -> Path:
@@ -209,16 +226,7 @@ def test_an_emergency_stop_is_decided_again_by_the_files_of_all_parts(robot: Run
             button.publish(Bool(data=pressed))
             robot.node.spin_for(0.1)
     robot.node.node.destroy_publisher(button)
-    file, velocity = written(robot, "stop_*.asc", wall_s), written(robot, "velocity_*.jsonl", wall_s)
-    inputs = read_velocity(velocity)
-    assert inputs.head.cause == "estop"
-    found = replay_velocity(inputs)
-    assert found.agrees, (found.mux_differences[:2], found.filter_differences[:2])
-    assert found.decisions > 50
-    assert "estop" in [replayed.cause for _, replayed in causes(found)]
-    code, text = run("record", "replay", str(file), "--json")
-    assert code == 0, run("record", "replay", str(file))
-    assert json.loads(text)["velocity"]["source"] == velocity.name
+    is_decided_again_by_all_parts(robot, written(robot, "stop_*.asc", wall_s), wall_s, "estop")
 
 
 def test_a_folder_that_cannot_be_written_is_told_to_the_caller_and_the_robot_goes_on(robot: RunningRobot) -> None:
