@@ -41,7 +41,7 @@ test-own-time: coverage ## tests that bring their own time: pure units, campaign
 
 .PHONY: test-real-time
 test-real-time: $(VENV)/ready ## tests in real time; WORKERS=2 two robots at a time; ONLY=bus simulated drives on a bus, ONLY=ros processes over DDS
-	@echo "about 30 minutes, mostly waiting; half of that with WORKERS=2"
+	@echo "about 25 minutes, mostly waiting; half of that with WORKERS=2"
 	pytest --reruns 1 --numprocesses $(or $(WORKERS),1) --dist $(if $(WORKERS),loadfile,load) $(addprefix $(TESTS)/,$(or $(ONLY),bus ros))
 
 .PHONY: test-root
