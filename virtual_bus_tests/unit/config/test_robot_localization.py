@@ -88,7 +88,7 @@ def test_the_command_prints_it_and_its_note() -> None:
     result = CliRunner().invoke(app, ["print", "ekf", "--imu", "imu/data"])
     assert result.exit_code == 0
     assert result.stdout == ekf(BENCH, "imu/data")
-    assert result.stderr.startswith("note: the filter publishes odom → base_link")
+    assert "\nnote: the filter publishes odom → base_link" in result.stderr  # after the robot that it means
 
 
 def test_the_docs_have_what_is_printed() -> None:
