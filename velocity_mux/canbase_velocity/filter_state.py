@@ -21,7 +21,15 @@ from canbase_velocity.glitch import GlitchFilter
 from canbase_velocity.motion import ExpectedMotion, Pose
 from canbase_velocity.obstacle import Geometry, Sight
 from canbase_velocity.placement import Placement
-from canbase_velocity.safety_filter import SHUTDOWN, FilterConfig, Inputs, ScanState, brakes_hard, decide
+from canbase_velocity.safety_filter import (
+    SHUTDOWN,
+    FilterConfig,
+    Inputs,
+    ScanState,
+    brakes_hard,
+    decide,
+    missing_scan,
+)
 from canbase_velocity.scan import Scan, ScanError
 from canbase_velocity.sole_publisher import SolePublisher
 from canbase_velocity.speed_limit import NO_LIMIT, SpeedLimit
@@ -295,8 +303,9 @@ class SafetyFilter:
         if self._ending:
             return self.shut_down(now_s)
         self._advance_estop(now_s)
-        decision = decide(self.inputs(now_s), self._config)
-        self._watch_scans(decision, now_s)
+        inputs = self.inputs(now_s)
+        decision = decide(inputs, self._config)
+        self._watch_scans(inputs, decision, now_s)
         return self._ordered(decision, now_s)
 
     def shut_down(self, now_s: float) -> Decision:
@@ -305,11 +314,13 @@ class SafetyFilter:
         emergency = brakes_hard(self.inputs(now_s), self._config)
         return self._ordered(replace(SHUTDOWN, emergency=emergency), now_s)
 
-    def _watch_scans(self, decision: Decision, now_s: float) -> None:
-        missing = decision.action is Action.STOP and decision.cause in NO_SCAN
+    def _watch_scans(self, inputs: Inputs, decision: Decision, now_s: float) -> None:
+        """Also while something else stops the base: a command that is late for a moment does not begin it anew."""
+        found = missing_scan(inputs) or decision
+        missing = found.action is Action.STOP and found.cause in NO_SCAN
         self._no_scan_from = min(self._no_scan_from, now_s) if missing else math.inf
         long = now_s - self._no_scan_from >= WITHOUT_SCANS_S
-        self.without_scans = f"no usable scan for {WITHOUT_SCANS_S:.1f} s: {decision.cause.value}" if long else ""
+        self.without_scans = f"no usable scan for {WITHOUT_SCANS_S:.1f} s: {found.cause.value}" if long else ""
 
     def _ordered(self, decision: Decision, now_s: float) -> Decision:
         self._motion.order(decision.twist, now_s)

@@ -134,7 +134,7 @@ class Inputs:
 def decide(inputs: Inputs, config: FilterConfig) -> Decision:
     """The order for these inputs: the most severe finding wins, of two alike the one of the earlier rule."""
     emergency = brakes_hard(inputs, config)
-    stopped = _estop(inputs, config) or _command(inputs, config) or _scan(inputs)
+    stopped = _estop(inputs, config) or _command(inputs, config) or missing_scan(inputs)
     if stopped is not None:
         return Decision(stopped.action, stopped.cause, stopped.detail, stopped.clears_on, ZERO, emergency)
     if inputs.command.is_zero:
@@ -190,7 +190,8 @@ def _command(inputs: Inputs, config: FilterConfig) -> Finding | None:
     return None
 
 
-def _scan(inputs: Inputs) -> Finding | None:
+def missing_scan(inputs: Inputs) -> Finding | None:
+    """A required scanner of which no scan counts; None: there is none. The command has no part in it."""
     bad = next((scan for scan in inputs.scans if scan.required and not scan.is_fresh), None)
     if bad is None:
         return None

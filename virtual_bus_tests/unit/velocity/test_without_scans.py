@@ -27,13 +27,14 @@ class Base:
     def now_s(self) -> float:
         return 10.0 + self.cycle * CYCLE_S
 
-    def run(self, seconds: float, *ahead: tuple[float, float]) -> str:
+    def run(self, seconds: float, *ahead: tuple[float, float], commanded: bool = True) -> str:
         """What the filter says of its scans at the end."""
         for _ in range(round(seconds / CYCLE_S)):
             self.cycle += 1
             if self.scans and self.cycle % 5 == 0:
                 see(self.filter, self.now_s, *ahead)
-            self.filter.on_command(FORWARD, self.now_s)
+            if commanded:
+                self.filter.on_command(FORWARD, self.now_s)
             self.causes.add(self.filter.decide(self.now_s).cause)
         return self.filter.without_scans
 
@@ -64,6 +65,17 @@ def test_gaps_that_are_each_shorter_do_not_add_up() -> None:
         base.run(0.5)
         base.scans = False
         assert base.run(TIMEOUT_S + 0.5) == ""
+
+
+def test_a_command_that_is_late_meanwhile_does_not_begin_the_second_anew() -> None:
+    """── no scans for 0.5 s ── no command for 0.3 s ── commands again, still no scans for 0.3 s ── disarmed"""
+    base = Base()
+    base.run(1.0)
+    base.scans = False
+    base.run(TIMEOUT_S + 0.5)
+    base.run(0.3, commanded=False)
+    assert StopCause.COMMAND_STALE in base.causes
+    assert base.run(0.3) == "no usable scan for 1.0 s: scan_stale"
 
 
 def test_an_obstacle_or_a_scanner_that_is_not_required_is_no_want_of_scans() -> None:
