@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -29,4 +30,4 @@ def test_each_line_has_the_time_at_which_it_was_written() -> None:
     assert len(written) == 25
     assert any(at % 1.0 < 0.1 for at, _ in written)
     assert all(told - 1e-6 <= at for at, told in written)
-    assert all(at <= told_next + 1e-6 for (at, _), (_, told_next) in zip(written, written[1:], strict=False))
+    assert all(at <= told_next + 1e-6 for (at, _), (_, told_next) in itertools.pairwise(written))
