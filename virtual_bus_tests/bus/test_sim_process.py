@@ -76,13 +76,14 @@ def test_it_boots_answers_and_tells_the_truth_with_monotonic_stamps(tmp_path: Pa
 
 
 def test_an_interrupt_of_all_parts_leaves_the_drives_to_the_driver_that_stops_them(tmp_path: Path) -> None:
-    """SYNC every 0.1 s ── SIGINT ── 1.2 s later a drive still answers ── no SYNC any more ── they end."""
+    """SYNC every 0.1 s ── SIGINT of the terminal, and of launch ── 1.2 s later a drive still answers ── no SYNC any
+    more ── they end."""
     of = _robot(tmp_path)
     ask = can.Message(arbitration_id=0x601, data=bytes.fromhex("4000100000000000"), is_extended_id=False)
     with can.Bus(**of.bus.arguments()) as bus, _running(tmp_path, of) as (process, _):
         for cycle in range(14):
             bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
-            if cycle == 1:
+            if cycle in (1, 3):
                 process.send_signal(signal.SIGINT)
             _frames(bus, 0.1)
         bus.send(ask)

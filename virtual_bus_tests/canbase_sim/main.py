@@ -8,6 +8,7 @@ receive SYNC.
 from __future__ import annotations
 
 import logging
+import math
 import signal
 import sys
 import time
@@ -30,6 +31,8 @@ log = logging.getLogger(__name__)
 
 IN_USE_S = 1.0
 """A driver sends SYNC more often than once in this time [s]."""
+ONE_S = 1.0
+"""Interrupts that are nearer to each other are one Ctrl-C: that of the terminal, and that which launch sends [s]."""
 
 
 def run(robot: Robot, control: str | None = None, *, quiet: bool = False, factory_fresh: bool = False) -> int:
@@ -87,9 +90,13 @@ def is_over(signals: Sequence[int], silent_s: float) -> bool:
 def _stop_signals() -> Iterator[list[int]]:
     """The numbers of the signals that came; afterwards SIGINT and SIGTERM do again what they did before."""
     received: list[int] = []
+    came_at_s = -math.inf
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        received.append(number)
+        nonlocal came_at_s
+        before_s, came_at_s = came_at_s, time.monotonic()
+        if number != signal.SIGINT or came_at_s - before_s > ONE_S:
+            received.append(number)
 
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
