@@ -41,11 +41,10 @@ class WheelTravel:
     """Travel of one wheel's rim since its first sample, from the raw position of its axis (6064h).
 
     Each sample is compared with the last one that was taken in. A step that the wheel cannot have made is a jump: it
-    is dropped. A sample that came after a gap may be as old as that gap is long: the step after it may be as much
-    longer. If the samples after a jump come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row stay at the new
-    place, the counter stays there: that place becomes the new reference, the travel goes on from where it was, and
-    `losses` counts it, as the travel of those samples is unknown. After such a jump no gap of more than
-    `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
+    is dropped. If the samples after it come back, nothing was lost. If `RE_REFERENCE_SAMPLES` in a row
+    stay at the new place, the counter stays there: that place becomes the new reference, the travel goes on
+    from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no gap
+    of more than `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
     """
 
     __slots__ = (
@@ -112,7 +111,7 @@ class WheelTravel:
         stays = self._suspects > 0 and self._is_near(self._suspect_raw, raw, cycles)
         if not stays and self._is_near(self._accepted_raw, raw, self._accepted_cycles):
             self._counts += unwrap(self._accepted_raw, raw)
-            self._accept(raw, waited=cycles - 1)
+            self._accept(raw)
         else:
             self._suspect(raw, stays)
         return self.travel_m
@@ -120,9 +119,9 @@ class WheelTravel:
     def _is_near(self, from_raw: int, raw: int, cycles: int) -> bool:
         return abs(unwrap(from_raw, raw)) <= self._max_step_counts * cycles
 
-    def _accept(self, raw: int, waited: int = 0) -> None:
+    def _accept(self, raw: int) -> None:
         self._accepted_raw = raw
-        self._accepted_cycles = waited
+        self._accepted_cycles = 0
         self._suspects = 0
 
     def _suspect(self, raw: int, stays: bool) -> None:

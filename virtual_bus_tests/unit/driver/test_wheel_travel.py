@@ -108,19 +108,8 @@ def test_a_step_beyond_what_the_wheel_can_do_is_dropped(step: int, taken: bool) 
 def test_missed_cycles_allow_a_longer_step() -> None:
     travel = wheel(0)
     assert travel.update(60, cycles=3) == pytest.approx(0.060)
-    assert travel.update(161, cycles=3) == pytest.approx(0.060)
+    assert travel.update(121, cycles=3) == pytest.approx(0.060)
     assert not travel.referenced
-
-
-@pytest.mark.parametrize(("step", "taken"), [(180, True), (181, False), (-180, True)])
-def test_the_step_after_a_late_sample_may_be_as_long_as_if_it_had_come_in_time(step: int, taken: bool) -> None:
-    """Sampled at 0 ms, sent at 80 ms, and the next one at 90 ms: in 10 ms the wheel seems to roll for 90 ms."""
-    travel = wheel(0)
-    travel.update(10, cycles=9)
-    travel.update(10 + step)
-    assert travel.referenced is taken
-    travel.update(10 + step + 21)
-    assert not travel.referenced, "the one after it is punctual again"
 
 
 def test_one_wild_sample_costs_nothing_when_the_next_one_comes_back() -> None:
