@@ -123,12 +123,12 @@ def _stop(path: Path, other: Robot | None) -> Replay:
     values: dict[str, Any] = {
         "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
         "versions": dict(inputs.versions),
-        "not_replayed": [told for part, _, _ in parts for told in part.pop("not_replayed", ())],
+        "not_replayed": [why for part, _, _ in parts for why in part.pop("not_replayed", ())],
     }
     lines = [f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {values['stop']['at_s']:.3f} s"]
-    for part, told, _ in parts:
+    for part, part_lines, _ in parts:
         values |= part
-        lines += told
+        lines += part_lines
     if other is not None:
         values["other_robot_yaml"], more = _with_other(inputs, other, trip and trip[1])
         lines += more

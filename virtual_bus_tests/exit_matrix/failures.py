@@ -38,11 +38,12 @@ COMMON = (
     (DRIVER, "SIGKILL"),
     (DRIVER, "SIGSTOP"),
     (VELOCITY, "SIGKILL"),
+    (WATCHDOG, "SIGKILL"),
     (WATCHDOG, "SIGSTOP"),
     (SERVER, "SIGSTOP"),
 )
 """Processes that `make test` kills and stops in a row of the matrix. It stops the velocity process in
-ros/test_velocity_hang.py, kills the server in ros/test_up.py, and the watchdog in the virtual robot."""
+ros/test_velocity_hang.py, and kills the server in ros/test_up.py."""
 
 
 @dataclass(frozen=True, slots=True)
