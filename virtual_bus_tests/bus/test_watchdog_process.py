@@ -67,6 +67,37 @@ def test_asked_to_end_at_speed_it_stops_first_and_then_ends_well(watched: Watche
     watched.robot.wait_until_still(timeout_s=0.1)
 
 
+def test_interrupted_with_the_driver_it_stays_until_the_power_is_off(watched: Watched) -> None:
+    """Enabled at rest ── SIGINT ── 0.4 s later the driver takes the power ── it ends ── the next one is clear."""
+    watched.robot.word = 0x0F
+    watched.robot.wait_for(lambda: all(drive.words[0] & 0x6F == 0x27 for drive in watched.robot.drives), 3.0)
+    time.sleep(0.2)
+    watched.process.send_signal(signal.SIGINT)
+    time.sleep(0.4)
+    assert watched.process.poll() is None
+    watched.robot.word = 0x00
+    code, log = watched.process.wait(2.0), watched.process.communicate()[1]
+    assert (code, "tripped" in log) == (0, False)
+    begin = time.monotonic()
+    watched.start()
+    watched.robot.first(0x1FE, begin, timeout_s=10.0)
+    assert "tripped" not in watched.end(signal.SIGTERM)[1]
+
+
+# a driver that hangs, or nobody but it was interrupted: it leaves the power on, and says so at its next start
+def test_interrupted_alone_it_ends_after_a_second_and_the_next_one_is_latched(watched: Watched) -> None:
+    watched.robot.word = 0x0F
+    watched.robot.wait_for(lambda: all(drive.words[0] & 0x6F == 0x27 for drive in watched.robot.drives), 3.0)
+    time.sleep(0.2)
+    asked_s = time.monotonic()
+    assert watched.end(signal.SIGINT)[0] == 0
+    assert 1.0 <= time.monotonic() - asked_s < 3.0
+    begin = time.monotonic()
+    watched.start()
+    watched.robot.first(0x1FE, begin, timeout_s=10.0)
+    assert "tripped: power at end" in watched.end(signal.SIGTERM)[1]
+
+
 def test_systemd_is_told_ready_alive_and_the_state_and_asked_to_end_at_rest_it_just_ends(watched: Watched) -> None:
     time.sleep(1.0)
     lines = watched.notified()

@@ -85,7 +85,10 @@ class Loop:
         """A timeout that ran out since then, while frames were taken in, is acted on at once."""
 
     def run(self, asked_to_end: Callable[[], bool]) -> None:
-        """Until `asked_to_end` is true and the wheels stand, at most END_S later. Raises BusDeadError, RelayError."""
+        """Until `asked_to_end` is true, the wheels are stationary and no drive has power, at most END_S later.
+
+        The driver that was interrupted with it takes the power. Raises BusDeadError, RelayError.
+        """
         while not asked_to_end():
             self._turn()
         now_s = time.monotonic()
@@ -193,7 +196,7 @@ class Loop:
 
     def _at_rest(self) -> bool:
         status = self._watchdog.status
-        return status.state is not State.TRIPPED or status.settled
+        return status.settled if status.state is State.TRIPPED else not self._watchdog.sees_power
 
     def _collect(self, now_s: float) -> None:
         """The collector is off in the loop; what little there is, it takes here, after the frames are out."""

@@ -250,6 +250,11 @@ class Watchdog:
         self._trip(Verdict(TripCause.ENDED, 0, detail), now_s)
         self._note_record(now_s)
 
+    @property
+    def sees_power(self) -> bool:
+        """Power that nobody has seen off: a life that ends now leaves a record that counts as a stop."""
+        return self._ledger.wanted.mark is Mark.LIVE
+
     def quick_stops(self) -> list[Frame]:
         """A quick stop for every node, whatever the state: for a way out on which nothing else can be trusted."""
         nodes = [drive.node_id for drive in self._config.drives]

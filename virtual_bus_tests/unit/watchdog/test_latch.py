@@ -186,8 +186,10 @@ def test_the_bit_is_set_when_live_is_on_disk() -> None:
     story.run(0.4)
     for drive in story.drives:
         drive.words[0] = 0x0233
+    assert not story.watchdog.sees_power
     story.run(0.1)
     assert mark_of(story) is Mark.LIVE
+    assert story.watchdog.sees_power
     assert not story.watchdog.status.armed
     assert story.since(0.0, STATE)[-1][1].data[2] == 0
     story.watchdog.on_record(None, "read-only file system")
