@@ -245,7 +245,7 @@ LOCK := uv pip compile --no-config --quiet --upgrade --universal --python-versio
   --custom-compile-command 'make lock'
 
 # What a user adds to it: a list for each extra, with the versions of the others.
-EXTRAS := cluster evidence explain metrics record web
+EXTRAS := evidence explain metrics record web
 define EXTRA
 import sys
 from pip._vendor import tomli

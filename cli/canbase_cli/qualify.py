@@ -6,10 +6,9 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
@@ -20,14 +19,10 @@ from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, wit
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
-    from canbase_qualification.crew import LocalCrew
-    from canbase_qualification.dask_crew import DaskCrew
     from canbase_qualification.folder import About
     from canbase_qualification.job import Amount, Job, Load
     from canbase_qualification.outcome import Outcome
     from canbase_qualification.results_file import ResultsFile
-
-    AnyCrew = LocalCrew | DaskCrew
 
 BROKEN_OFF: Final = 128 + signal.SIGINT
 """Exit code after Ctrl-C, as of a shell."""
@@ -70,10 +65,6 @@ def qualify(
     workers: Annotated[
         int | None, typer.Option(min=1, max=1024, metavar="N", help="Processes.", show_default="all processors")
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Of a dask cluster that runs it: tcp://host:8786.", show_default="none"),
-    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="For the results.", show_default="qualification_NAME")
     ] = None,
@@ -111,11 +102,8 @@ def qualify(
     folder = out or Path(f"qualification_{loaded.robot.name}")
     if report:
         write_and_exit(folder, loaded)
-    if scheduler is not None and workers is not None:
-        raise typer.BadParameter("the workers of a cluster are started there: dask worker", param_hint="--workers")
-    crew = partial(_crew, scheduler, workers or os.cpu_count() or 1)
     with _sigterm_as_ctrl_c():
-        _Qualify(loaded, folder, amount, payloads, slope).run(crew, resume=resume)
+        _Qualify(loaded, folder, amount, payloads, slope).run(workers or os.cpu_count() or 1, resume=resume)
 
 
 @contextmanager
@@ -125,19 +113,6 @@ def _sigterm_as_ctrl_c() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _crew(scheduler: str | None, workers: int) -> AnyCrew:
-    if scheduler is None:
-        from canbase_qualification.crew import LocalCrew
-
-        return LocalCrew(workers)
-    try:
-        from canbase_qualification.dask_crew import DaskCrew
-
-        return DaskCrew(scheduler)
-    except ModuleNotFoundError as error:
-        fail(f"--scheduler needs the Python package {error.name}: pip install 'distributed>=2025.1,<2027'", WRONG_INPUT)
 
 
 def _load(payloads: tuple[float, float] | None, slope: float | None, before: Load | None = None) -> Load:
@@ -193,7 +168,7 @@ class _Qualify:
         self._payloads, self._slope = payloads, slope
         self._tally, self._load = Tally(), _load(payloads, slope)
 
-    def run(self, new_crew: Callable[[], AnyCrew], *, resume: bool) -> NoReturn:
+    def run(self, workers: int, *, resume: bool) -> NoReturn:
         """To the end of the command."""
         from canbase_qualification.crew import CrewError
         from canbase_qualification.folder import FolderError
@@ -204,7 +179,7 @@ class _Qualify:
         try:
             job, about = self._prepared(resume=resume)
             with ResultsFile(self._folder) as results:
-                self._carry_out(job, about, results, new_crew)
+                self._carry_out(job, about, results, workers)
         except (FolderError, ResultsError) as error:
             fail(str(error), WRONG_INPUT)
         except (CrewError, WorkError, WorkerDiedError, OSError) as error:
@@ -259,10 +234,11 @@ class _Qualify:
         except WorkError as error:
             _unfit(self._loaded, RuntimeError(f"in simulation its drives get no power: {str(error).splitlines()[-1]}"))
 
-    def _carry_out(self, job: Job, about: About, results: ResultsFile, new_crew: Callable[[], AnyCrew]) -> None:
+    def _carry_out(self, job: Job, about: About, results: ResultsFile, workers: int) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+        from canbase_qualification.crew import LocalCrew
         from canbase_qualification.qualification import carry_out, missing
 
         self._tally.add(results.before)
@@ -270,7 +246,7 @@ class _Qualify:
         _say_before(about)
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("runs"), TimeRemainingColumn())
         with (
-            new_crew() as crew,
+            LocalCrew(workers) as crew,
             Progress(
                 *columns, TextColumn("{task.fields[found]}"), console=Console(file=with_cursor(sys.stderr))
             ) as bar,

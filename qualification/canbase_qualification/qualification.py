@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Protocol
 
 from canbase_config.robot import Robot
-from canbase_qualification.crew import Done
+from canbase_qualification.crew import LocalCrew
 from canbase_qualification.job import Amount, Batch, Job, Load, batches
 from canbase_qualification.outcome import Outcome
 from canbase_qualification.results_file import ResultsFile
@@ -15,14 +14,6 @@ from canbase_qualification.simulated_robot import Simulated, UnfitError, simulat
 
 SLOWEST_MPS = 0.05
 """A base that drives no faster at full speed shows nothing about stops."""
-
-
-class Crew(Protocol):
-    """Whoever carries out batches, here or on other computers."""
-
-    def results(self, job: Job, batches: Iterable[Batch]) -> Iterator[Done]:
-        """As they are ready, in any order."""
-        ...
 
 
 def job_of(robot: Robot, load: Load) -> tuple[Job, Simulated]:
@@ -52,7 +43,7 @@ def missing(job: Job, amount: Amount, done: frozenset[tuple[str, int]]) -> list[
 
 
 def carry_out(
-    job: Job, todo: list[Batch], crew: Crew, results: ResultsFile, on_outcomes: Callable[[Iterable[Outcome]], None]
+    job: Job, todo: list[Batch], crew: LocalCrew, results: ResultsFile, on_outcomes: Callable[[Iterable[Outcome]], None]
 ) -> None:
     """Run what is missing. What is done is in the file at once, whatever comes then; at the end it is sorted."""
     for done in crew.results(job, todo):

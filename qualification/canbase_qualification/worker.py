@@ -1,6 +1,6 @@
 """The parent's end of a process that carries out batches: `carry_out.py`.
 
-That process has one thread, so a run can be forked in it; whoever has threads, a dask worker too, starts one. Requests
+That process has one thread, so a run can be forked in it; whoever has threads starts one. Requests
 and answers are pickled values on its standard input and output: the same canbase at both ends.
 """
 

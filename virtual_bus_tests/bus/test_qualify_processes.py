@@ -1,17 +1,13 @@
-"""`canbase prove qualify` with its real processes: killed, broken off, resumed, and on a dask cluster of this
-computer."""
+"""`canbase prove qualify` with its real processes: killed, broken off, resumed, and in parts."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -112,6 +108,17 @@ def test_ctrl_c_keeps_what_is_done_and_resume_goes_on_as_if_nothing_had_been(few
     assert results(folder) == results(few)
 
 
+def test_parts_of_several_computers_become_the_same_file(few: Path, tmp_path: Path) -> None:
+    for name, seed in (("part1", "24"), ("part2", "25")):
+        words = ("--seed", seed, "--scenarios", "1", "--stops", "0", "--drives", "0")
+        assert run(tmp_path / name, *words).returncode == 0
+    with (tmp_path / "part1" / "results.jsonl").open("ab") as file:
+        file.write(results(tmp_path / "part2"))
+    merged = run(tmp_path / "part1", "--scenarios", "2", "--resume")
+    assert merged.returncode == 0, merged.stderr
+    assert results(tmp_path / "part1") == results(few)
+
+
 def test_resume_refuses_another_load_and_another_robot(few: Path, tmp_path: Path) -> None:
     other = tmp_path / "robot.yaml"
     other.write_text(sample("bench").read_text().replace("linear_mps: 0.8", "linear_mps: 0.7"))
@@ -124,85 +131,3 @@ def test_resume_refuses_another_load_and_another_robot(few: Path, tmp_path: Path
         assert refused.exit_code == 2
         assert words in refused.stderr
     assert results(few) == before
-
-
-@contextmanager
-def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A scheduler and then workers of one thread each, on the loopback interface."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
-    host, port = "127.0.0.1", address.rpartition(":")[2]
-    with ExitStack() as stack:
-
-        def start(name: str, *arguments: str) -> subprocess.Popen[bytes]:
-            log = stack.enter_context((folder / f"{name}.log").open("wb"))
-            line = [sys.executable, "-m", "dask", *arguments]
-            process = subprocess.Popen(line, stdout=log, stderr=log, start_new_session=True, cwd=folder)
-            stack.callback(end, process)
-            return process
-
-        scheduler = start("scheduler", "scheduler", "--host", host, "--port", port, "--no-dashboard")
-        limits = ("--nthreads", "1", "--no-dashboard", "--no-nanny")
-        started = [
-            start(f"worker{number}", "worker", address, *limits, "--local-directory", str(folder / str(number)))
-            for number in range(workers)
-        ]
-        yield address, [scheduler, *started]
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    process.wait()
-
-
-def test_a_cluster_gives_the_same_file_also_when_a_worker_is_killed_in_the_middle(few: Path, tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    with cluster(tmp_path, 2) as (address, (_, *workers)):
-        line = command(tmp_path / "q", *FEW, "--scheduler", address)
-        qualify = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        busy: list[subprocess.Popen[bytes]] = []
-
-        def is_busy() -> bool:
-            assert qualify.poll() is None, qualify.communicate()
-            busy[:] = [each for each in workers if children(each.pid, "canbase_qualification.carry_out")]
-            return bool(busy)
-
-        wait_for("a busy worker", is_busy)
-        (carries_out,) = children(busy[0].pid, "canbase_qualification.carry_out")
-        end(busy[0])
-        _, err = qualify.communicate(timeout=BATCHES_S)
-        assert qualify.returncode == 0, err
-        assert results(tmp_path / "q") == results(few)
-        wait_for("the process of the killed worker ends", lambda: not Path(f"/proc/{carries_out}").exists(), 30.0)
-
-
-def test_a_scheduler_that_dies_ends_it_with_a_sentence(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    with cluster(tmp_path, 1) as (address, (scheduler, worker)):
-        line = command(tmp_path / "q", *FEW, "--scheduler", address)
-        qualify = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        wait_for("a busy worker", lambda: children(worker.pid, "canbase_qualification.carry_out"))
-        end(scheduler)
-        _, err = qualify.communicate(timeout=BATCHES_S)
-    assert qualify.returncode == 1, err
-    assert "the scheduler of the cluster has ended, or cannot be reached any more. What was done is kept" in err
-    assert "Traceback" not in err
-
-
-IMPATIENT = """
-from canbase_qualification import dask_crew
-dask_crew.CONNECT_S = 0.5
-from canbase_cli.main import app
-app()
-"""
-
-
-def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    words = command(tmp_path / "q", *FEW, "--scheduler", "tcp://127.0.0.1:9")[3:]
-    line = [sys.executable, "-c", IMPATIENT, *words]
-    refused = subprocess.run(line, capture_output=True, text=True, timeout=BATCHES_S, check=False)
-    assert refused.returncode == 1
-    assert "--scheduler tcp://127.0.0.1:9: no dask scheduler answers there" in refused.stderr
-    assert "--resume goes on" in refused.stderr

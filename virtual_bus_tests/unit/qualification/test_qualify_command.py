@@ -65,11 +65,6 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     assert (code, "cannot be written: Not a directory" in text) == (2, True)
 
 
-def test_workers_of_a_cluster_are_not_started_here() -> None:
-    code, text = called(str(sample("bench")), "--scheduler", "tcp://127.0.0.1:1", "--workers", "2")
-    assert (code, "dask worker" in text) == (2, True)
-
-
 def test_a_scenario_is_told_with_its_robot_its_plan_and_what_every_part_did() -> None:
     code, text = called(str(sample("bench")), "--scenario", "17")
     assert code == 0, text
