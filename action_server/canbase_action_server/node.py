@@ -1,6 +1,6 @@
 """The ROS node drive_distance_server: topics in, a timer that ticks the goals, the actions' callbacks, log lines.
 
-Runs in one thread (docs/decisions/0062-an-action-server-that-idles.md): no callback blocks or awaits, and none can
+Runs in one thread (docs/decisions/0062-one-executor-in-one-thread.md): no callback blocks or awaits, and none can
 come between the decision on a goal and its admission. At rest there is no timer, and odometry is kept as it came.
 """
 
