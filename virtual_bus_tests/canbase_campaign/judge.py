@@ -476,7 +476,7 @@ class Judge:
         moved = now_s <= self._strangers.acted_at + self.react_s
         gives = dict(self._active.gives_s())
         gives["unreachable"] = math.inf if self._reach.was_lost else 0.0
-        gives["rolls out"] = math.inf if self._active.coasting else 0.0
+        gives["rolls out"] = math.inf if self._coasts() else 0.0
         gives["strange hands"] = math.inf if moved else 0.0
         gives["pushed"] = math.inf if world.drives.bench.base.push_n != world.drawn.push_n else 0.0
         gives["lying sensor"] = math.inf if self._motion.ran_away or not self._shown.tells_truth else 0.0
