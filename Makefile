@@ -165,7 +165,7 @@ pictures: $(VENV)/ready ## the pictures of docs/web.md, explain.md and qualify.m
 	for picture in $$(grep -ho '\(web\|explain\|qualify\|evidence\)_[a-z_]*\.png' docs/web.md docs/explain.md docs/qualify.md); do cp build/pictures/$$picture docs/pictures; done
 
 .PHONY: hazards
-hazards: $(VENV)/ready ## checks hazards.yaml and writes the ten rows of docs/safety.md
+hazards: $(VENV)/ready ## checks hazards.yaml, writes docs/hazards.md and the ten rows of docs/safety.md
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m hazards
 
 .PHONY: refusals
@@ -177,7 +177,7 @@ drive-pages: $(VENV)/ready ## docs/drives/KIND.md: what the boot writes, how eac
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.drive_pages
 
 .PHONY: structure
-structure: $(VENV)/ready ## docs/states.svg: the states of the driver, from their table
+structure: $(VENV)/ready ## docs/states.svg: the states of the driver; measured figures in the sentences of pages
 	PYTHONPATH=$(CURDIR)/docs python -m site_builder
 
 .PHONY: recording

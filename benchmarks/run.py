@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import io
 import os
-import platform
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -73,7 +72,7 @@ def main() -> int:
         print("\n".join(f"{name:14}{_purpose(there[name])}" for name in arguments.names or there))
         return 0
     try:
-        before = kept.read(arguments.compare) if arguments.compare else None
+        before = kept.ratios(arguments.compare) if arguments.compare else None
     except (OSError, ValueError) as error:
         parser.error(str(error))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -81,7 +80,7 @@ def main() -> int:
     Console(width=None if sys.stdout.isatty() else 160).print(_table(figures))
     if arguments.write:
         text = arguments.write.read_text(encoding="utf-8")
-        arguments.write.write_text(rewritten(text, figures), encoding="utf-8")
+        arguments.write.write_text(rewritten(text, kept.machine(), figures), encoding="utf-8")
     if arguments.json:
         kept.write(arguments.json, figures)
     if before is not None:
@@ -124,16 +123,15 @@ def _table(figures: list[Figure]) -> Table:
     return table
 
 
-def rewritten(text: str, figures: list[Figure]) -> str:
+def rewritten(text: str, machine: str, figures: list[Figure]) -> str:
     """`text` with the table between BEGIN and END. Raises ValueError when these lines are not there."""
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):
         raise ValueError(f"the file has no lines {BEGIN} and {END}: between them the table is written")
-    processors = f"{os.cpu_count()} processors ({platform.machine()}), Python {platform.python_version()}"
     lines = [f"| {' | '.join(cells(figure))} |" for figure in figures]
     head = f"| {' | '.join(COLUMNS)} |\n|---|---|---|---:|---|---|"
-    return "\n".join((f"{before}{begin}", f"{processors}, the virtual bus:\n", head, *lines, f"{end}{after}"))
+    return "\n".join((f"{before}{begin}", f"{machine}, the virtual bus:\n", head, *lines, f"{end}{after}"))
 
 
 if __name__ == "__main__":

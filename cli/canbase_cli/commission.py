@@ -64,9 +64,7 @@ def commission(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the changes, do not write robot.yaml.")] = False,
     as_json: Annotated[
         bool,
-        typer.Option(
-            "--json", help="Ask and be answered in lines of JSON, for another program: docs/commissioning.md."
-        ),
+        typer.Option("--json", help="Ask and be answered in lines of JSON, for another program: docs/ros_api.md."),
     ] = False,
 ) -> None:
     """Guided first motion: WHEELS UP. Direction, scale, self-stop test, wheel radius and track.

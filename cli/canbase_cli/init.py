@@ -35,9 +35,7 @@ def init(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Take the proposed answer of each question.")] = False,
     as_json: Annotated[
         bool,
-        typer.Option(
-            "--json", help="Ask and be answered in lines of JSON, for another program: docs/commissioning.md."
-        ),
+        typer.Option("--json", help="Ask and be answered in lines of JSON, for another program: docs/ros_api.md."),
     ] = False,
 ) -> None:
     """Write a robot.yaml: find the drives on the bus, and ask about the robot. Nothing moves.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from canbase_hazards import catalogue
-from hazards.page import cards, sample_robot
 from site_builder import api_pages, command_page, decision_page, message_page, structure
 
 
@@ -17,7 +15,6 @@ def write(root: Path) -> None:
         "commands.md": command_page.page(),
         "decisions.md": decision_page.page(root),
         "files.md": structure.page(root),
-        "hazards.md": cards(catalogue.load(), sample_robot()),
         "messages.md": message_page.page(root),
     }
     for name, text in made.items():

@@ -16,7 +16,7 @@ Sentence = Annotated[str, Field(min_length=3)]
 
 
 class Part(Enum):
-    """What fails; one heading of docs/generated/hazards.md each."""
+    """What fails; one heading of docs/hazards.md each."""
 
     PROCESS = "process"
     BUS_AND_DRIVES = "bus_and_drives"

@@ -1,6 +1,6 @@
 """Times that the documents state: the judges of the campaign read them here, never in the code that they judge.
 
-`stated_s`: how soon the layer of a row of hazards.yaml acts (docs/generated/hazards.md shows the
+`stated_s`: how soon the layer of a row of hazards.yaml acts (docs/hazards.md shows the
 same formulas). The constants are those of docs/bus.md, which no key of robot.yaml changes. Tests compare both with the
 pages and with the product.
 """

@@ -1,9 +1,10 @@
-"""Pages made of canbase_hazards/hazards.yaml: a card for each hazard, and the ten rows of docs/safety.md."""
+"""Pages made of canbase_hazards/hazards.yaml: docs/hazards.md, a card for each, and the ten rows of docs/safety.md."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -13,9 +14,12 @@ from canbase_hazards.promise import worst_distance_m
 from exit_matrix.page_table import NOTHING
 from hazards.measured import longest_stop
 from hazards.proofs import ROOT, stops
+from support.marked_page import rewritten
 
 PAGE = ROOT / "docs" / "safety.md"
-"""Has the ten rows; `make docs` makes docs/generated/hazards.md of the cards."""
+"""Has the ten rows."""
+CARDS_PAGE = ROOT / "docs" / "hazards.md"
+"""Has the cards, and nothing else."""
 COMMAND = "make hazards"
 SAMPLE = "bench"
 FIRST = (
@@ -43,8 +47,8 @@ TEN = """\
 CARDS = """\
 # Hazards
 
-Every failure that canbase has a rule for. `make docs` makes this page of
-`qualification/canbase_hazards/hazards.yaml`. [Safety](../safety.md) has the limits of canbase. Everything here limits
+Every failure that canbase has a rule for. `make hazards` writes this page from
+`qualification/canbase_hazards/hazards.yaml`. [Safety](safety.md) has the limits of canbase. Everything here limits
 damage; nothing here is a certified safety function.
 
 - The first line is the failure; in italics the unsafe control action that it could cause; in brackets the hazard of
@@ -56,7 +60,7 @@ damage; nothing here is a certified safety function.
   the behaviour; it is not claimed.
 - **Distance**: in that time at `limits.linear_mps`, and braking: by the driver's ramp (`limits.deceleration_mps2`) or
   by the drives' quick stop (`limits.emergency_deceleration_mps2`). Add the jerk limit and the delays of your drives.
-- **Measured**: the longest stop from 0.4 m/s in [stop times](../stop_times.md).
+- **Measured**: the longest stop from 0.4 m/s in [stop times](stop_times.md).
 - **Proof**: `matrix` is a row of `make exit-matrix`, `virtual robot` a scenario of `make vm-test`. The other names are
   tests below `virtual_bus_tests/`. A hazard whose test does not exist, is skipped or fails breaks the build.
 """
@@ -67,6 +71,17 @@ def sample_robot() -> Robot:
     return load_robot(sample(SAMPLE)).robot
 
 
+def pages(catalogue: Catalogue) -> dict[Path, str]:
+    """Both pages, up to date."""
+    robot, safety = sample_robot(), PAGE.read_text(encoding="utf-8")
+    return {PAGE: rewritten(safety, COMMAND, ten_rows(catalogue, robot)), CARDS_PAGE: cards(catalogue, robot)}
+
+
+def out_of_date(made: Mapping[Path, str]) -> list[str]:
+    """The pages that have another text now."""
+    return [str(path.relative_to(ROOT)) for path, text in made.items() if path.read_text(encoding="utf-8") != text]
+
+
 def ten_rows(catalogue: Catalogue, robot: Robot) -> str:
     """The table of docs/safety.md."""
     rows = {row.id: row for row in catalogue.rows}
@@ -75,7 +90,7 @@ def ten_rows(catalogue: Catalogue, robot: Robot) -> str:
 
 
 def cards(catalogue: Catalogue, robot: Robot) -> str:
-    """The page docs/generated/hazards.md: a heading for each part of a robot, below it one for each hazard."""
+    """The page docs/hazards.md: a heading for each part of a robot, below it one for each hazard."""
     linked = _linked(catalogue)
     parts = [CARDS]
     for part in Part:
@@ -119,7 +134,7 @@ def _facts(row: Row, robot: Robot, linked: Callable[[str], str]) -> Iterator[tup
 def _line(row: Row, robot: Robot) -> str:
     stop = longest_stop(row, stops())
     cells = (
-        f"[{row.failure.rstrip('.')}](generated/hazards.md#{anchor(row.id)})",
+        f"[{row.failure.rstrip('.')}](hazards.md#{anchor(row.id)})",
         row.layer,
         _time(row, robot) or NOTHING,
         _distance(row, robot) or NOTHING,

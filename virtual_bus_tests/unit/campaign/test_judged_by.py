@@ -57,8 +57,8 @@ def test_the_rungs_are_those_of_the_page_and_the_ladder_is_no_slower() -> None:
     assert FRESH_S <= stated_times.RESET_FEEDBACK_S
 
 
-def test_a_state_is_lost_as_the_page_of_actions_states() -> None:
-    page = (ROOT / "docs/actions.md").read_text(encoding="utf-8")
+def test_a_state_is_lost_as_the_page_states() -> None:
+    page = (ROOT / "docs/ros_api.md").read_text(encoding="utf-8")
     assert f"`safety_filter/state` {stated_times.STATE_LOST_S:g} s" in page
     assert state_age.STATE_PERIOD_S <= stated_times.STATE_PERIOD_S
     assert state_age.state_timeout_s() <= stated_times.STATE_LOST_S + 1e-9

@@ -26,16 +26,22 @@ def test_durations_are_told_in_milliseconds() -> None:
 
 
 def test_the_page_says_which_budget_is_missed() -> None:
-    lines = run.rewritten(f"# Title\n{run.BEGIN}\nold\n{run.END}\nend\n", [KEPT, MISSED]).splitlines()
+    lines = run.rewritten(f"# Title\n{run.BEGIN}\nold\n{run.END}\nend\n", "two", [KEPT, MISSED]).splitlines()
     assert "| a loop | p99 1.00 ms | C: p99 0.80 ms | 1.25 | ≤ 1.5 × C | yes |" in lines
     assert "old" not in lines
     assert (lines[0], lines[-1]) == ("# Title", "end")
     assert "| a node | 30 % | bare: 10 % | 3.00 | ≤ 2 × bare | **no** |" in lines
 
 
+def test_the_page_has_the_figures_that_are_kept() -> None:
+    root = Path(run.__file__).parents[1]
+    page = (root / "docs" / "performance.md").read_text(encoding="utf-8")
+    assert run.rewritten(page, *kept.read(root / "benchmarks" / "kept.json")) == page, "run `make bench`"
+
+
 def test_a_page_without_a_place_for_the_table_is_left_alone() -> None:
     with pytest.raises(ValueError, match="the file has no lines"):
-        run.rewritten("# Title\n", [KEPT])
+        run.rewritten("# Title\n", "two", [KEPT])
 
 
 @pytest.mark.parametrize(("figure", "code"), [(KEPT, 0), (MISSED, 1)])
@@ -80,7 +86,7 @@ def test_progress_tells_which_of_how_many_runs_and_how_long_it_took(
 @pytest.mark.parametrize(("ratio", "worse"), [(1.25, False), (1.56, False), (1.57, True), (0.5, False)])
 def test_a_ratio_that_grows_beyond_its_noise_is_worse(tmp_path: Path, ratio: float, worse: bool) -> None:
     kept.write(tmp_path / "before.json", [KEPT])
-    found = kept.losses([replace(KEPT, ratio=ratio)], kept.read(tmp_path / "before.json"))
+    found = kept.losses([replace(KEPT, ratio=ratio)], kept.ratios(tmp_path / "before.json"))
     assert bool(found) is worse
     assert not worse or "a loop: ratio 1.57, it was 1.25: worse by 26%, of which 25% may be noise" in found
 
@@ -99,10 +105,13 @@ def test_a_run_of_some_keeps_the_ratios_of_the_others(tmp_path: Path) -> None:
     path = tmp_path / "kept.json"
     kept.write(path, [KEPT, MISSED])
     kept.write(path, [replace(MISSED, ratio=2.5), replace(KEPT, what="no ratio", ratio=None)])
-    assert kept.read(path) == {"a loop": 1.25, "a node": 2.5}
+    assert kept.ratios(path) == {"a loop": 1.25, "a node": 2.5}
+    assert [figure.what for figure in kept.read(path)[1]] == ["a loop", "a node", "no ratio"]
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"ratios": 5}', '{"ratios": {"a loop": null}}'])
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"machine": "", "figures": 5}', '{"machine": "", "figures": [{"what": 1}]}']
+)
 def test_a_file_that_is_none_of_these_is_refused_before_anything_runs(tmp_path: Path, text: str) -> None:
     path = tmp_path / "other.json"
     path.write_text(text)

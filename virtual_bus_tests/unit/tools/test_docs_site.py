@@ -14,6 +14,7 @@ from site_builder import (
     api_pages,
     command_page,
     decision_page,
+    figures,
     message_page,
     offline,
     source_pages,
@@ -40,6 +41,13 @@ def test_the_picture_of_the_states_is_the_one_of_the_table() -> None:
     assert set(state_picture.AT) == set(Phase)
     ends = {after for _, after in state_picture.edges()} | set(state_picture.waits())
     assert ends == set(Phase), "each state can be reached"
+
+
+def test_each_figure_in_a_sentence_is_the_one_that_was_measured() -> None:
+    pages = figures.pages(ROOT)
+    assert [path.name for path, text in pages.items() if text != path.read_text("utf-8")] == [], "run `make structure`"
+    used = {name for text in pages.values() for name in re.findall(r"<!-- figure ([^>]*?) -->", text)}
+    assert used == set(figures.figures(ROOT))
 
 
 def test_a_file_has_a_line_on_the_page_of_files(tmp_path: Path) -> None:
@@ -117,6 +125,22 @@ def test_every_reference_to_a_decision_leads_to_its_record() -> None:
             assert records.get(int(number), "").startswith(f"{number}{slug}"), f"{path}: decisions/{number}{slug}"
         for number in re.findall(r"[Dd]ecision (\d+)", text):
             assert int(number) in records, f"{path}: decision {number}"
+
+
+def test_every_link_of_a_page_leads_to_a_file_that_github_has_too() -> None:
+    pages = {path: re.sub(r"(?s)```.*?```", "", text) for path, text in texts() if path.suffix == ".md"}
+    links = [
+        (page, link)
+        for page, text in pages.items()
+        for link in re.findall(r"\]\((?!\w+:)([^)#\s]+)(?:#[^)\s]*)?\)", text)
+        if "generated" not in page.parts
+    ]
+    assert len(links) > 200
+    assert [
+        f"{page.relative_to(ROOT)}: {link}"
+        for page, link in links
+        if not (page.parent / link).exists() or "generated" in (page.parent / link).parts
+    ] == []
 
 
 def test_a_record_has_its_parts_and_each_former_number_is_in_one() -> None:
