@@ -5,11 +5,11 @@ qualification.json says what results.jsonl is about; robot.yaml is the file as i
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
+
+from pydantic import TypeAdapter
 
 from canbase_qualification.job import Amount, Load
 from canbase_qualification.software import Software
@@ -45,30 +45,19 @@ class About:
 
     def text(self) -> str:
         """As JSON."""
-        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
+        return f"{_ABOUT.dump_json(self, indent=2).decode()}\n"
 
-    @staticmethod
-    def of_text(text: str) -> About:
-        """From JSON. ValueError, KeyError, TypeError: it is none."""
-        plain: Mapping[str, Any] = json.loads(text)
-        low, high = plain["load"]["payloads"]
-        parts = {
-            "software": Software.of_plain(plain["software"]),
-            "load": Load((low, high), plain["load"]["slope"]),
-            "amount": Amount(**plain["amount"]),
-            "assumed": tuple(plain["assumed"]),
-            "not_judged": tuple(plain["not_judged"]),
-        }
-        return About(**{**plain, **parts})
+
+_ABOUT: Final = TypeAdapter(About)
 
 
 def read_about(folder: Path) -> About:
     """FolderError: there is none, or it cannot be read."""
     try:
-        return About.of_text((folder / NAME).read_text(encoding="utf-8"))
+        return _ABOUT.validate_json((folder / NAME).read_bytes())
     except FileNotFoundError as error:
         raise FolderError(f"{folder} has no {NAME}: it is no folder of canbase prove qualify") from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError) as error:
         raise FolderError(f"{folder / NAME} cannot be read: {error}") from error
 
 

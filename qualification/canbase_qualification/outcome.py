@@ -6,15 +6,19 @@ overlapping failures, and its properties hold or do not; *driving* has no failur
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, ClassVar, Final
+
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
 SCENARIO, STOP, DRIVING = "scenario", "stop", "driving"
 KINDS: Final = (STOP, SCENARIO, DRIVING)
 """In this order they are in results.jsonl."""
+
+
+Span = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
+"""[s]. Infinity is null in JSON."""
 
 
 class BrokenLineError(ValueError):
@@ -31,11 +35,11 @@ class MeasuredStop:
     """Which part stopped the base, and why, such as `watchdog: lease lost`; empty: none of them reports a cause."""
     speed_mps: float
     """Of the base when the failure began."""
-    time_s: float
+    time_s: Span
     """Until its lasting standstill; infinity: it never came."""
     way_m: float
     """Between where it was then and where it stands, straight."""
-    power_off_s: float
+    power_off_s: Span
     """Until no motor had power any more; infinity: some always had, a stop does not need that."""
     peak_mps: float = 0.0
     """Of the fastest rim."""
@@ -64,7 +68,9 @@ class Ages:
 class Outcome:
     """One run. `kind` and `seed` say which: `canbase prove qualify FILE --scenario SEED` tells a scenario as a log."""
 
-    kind: str
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", ser_json_inf_nan="null")
+
+    kind: Annotated[str, Field(pattern=f"^({'|'.join(KINDS)})$")]
     seed: int
     robot: str
     """The body that was drawn for it: mass, payload, slope, …"""
@@ -89,41 +95,15 @@ class Outcome:
 
     def line(self) -> str:
         """As one line of JSON, without the end of the line. Infinity is null."""
-        return json.dumps(_plain(self), ensure_ascii=False, allow_nan=False)
+        return _LINE.dump_json(self).decode()
 
     @staticmethod
     def of_line(line: str) -> Outcome:
         """The outcome of a line. Raises BrokenLineError: it is cut off, or no outcome."""
         try:
-            return _outcome(json.loads(line))
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            return _LINE.validate_json(line)
+        except ValidationError as error:
             raise BrokenLineError(f"no outcome of a run: {line[:80]!r}: {error}") from error
 
 
-def _plain(value: object) -> object:
-    """Dataclasses as objects, tuples as lists; whatever is infinite as null."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, Outcome | MeasuredStop | Violation | Ages):
-        return {name: _plain(getattr(value, name)) for name in value.__dataclass_fields__}
-    return value
-
-
-def _outcome(plain: Mapping[str, Any]) -> Outcome:
-    if plain["kind"] not in KINDS:
-        raise ValueError(f"kind {plain['kind']!r} is none of {', '.join(KINDS)}")
-    parts = {
-        "faults": tuple(str(name) for name in plain["faults"]),
-        "trips": tuple(str(name) for name in plain["trips"]),
-        "violations": tuple(Violation(**each) for each in plain["violations"]),
-        "stops": tuple(_stop(each) for each in plain["stops"]),
-        "ages": tuple(Ages(**each) for each in plain["ages"]),
-    }
-    return Outcome(**{**plain, **parts})
-
-
-def _stop(plain: Mapping[str, Any]) -> MeasuredStop:
-    never = {name: math.inf for name in ("time_s", "power_off_s") if plain[name] is None}
-    return MeasuredStop(**{**plain, **never})
+_LINE: Final = TypeAdapter(Outcome)

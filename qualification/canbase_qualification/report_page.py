@@ -1,128 +1,96 @@
-"""The page of a qualification: one file that opens without a network. Plots are Plotly's; texts are escaped.
-
-Texts go through `html.escape`, plots come as JSON. The page may load nothing (its Content-Security-Policy).
-"""
+"""The page of a qualification: its sections, and plots of Plotly that come as JSON."""
 
 from __future__ import annotations
 
-import html
-import json
 import re
 from importlib.resources import files
-from string import Template
-from typing import Any, Final
+from typing import Final
 
 from plotly.offline import get_plotlyjs
 
 from canbase_qualification.report import Report
 from canbase_qualification.report_plots import curves, named, overview
 from canbase_qualification.sections import Section, Table
-from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
+from canbase_recording import html_page
+from canbase_recording.html_page import Html, bullets, data, marked, section, table, tag, terms
 
-CODE: Final = re.compile(r"`([^`]+)`")
-STRONG: Final = re.compile(r"\*\*([^*<>]+)\*\*")
-EMPHASIS: Final = re.compile(r"(?<!\w)\*([^*<>]+)\*(?!\w)")
 NUMBER: Final = re.compile(r"^[\d.,]+( s| m| %|%)?$|^—|^never$")
+METRICS: Final = ("distance_m", "time_s")
 
 
 def page(title: str, report: Report, sections: list[Section]) -> str:
     """The whole page."""
-    template = Template((files("canbase_qualification") / "report_page.html").read_text(encoding="utf-8"))
     first, *rest = sections
-    links = "".join(f'<li><a href="#{section.key}">{_text(section.title)}</a></li>' for section in rest)
-    return template.substitute(
-        title=_text(title),
-        grade=report.grade.value,
-        first=_first(first),
-        contents=links,
-        sections="".join(_section(section, report) for section in rest),
-        plotly=get_plotlyjs(),
+    links = bullets(tag("a", marked(each.title), href=f"#{each.key}") for each in rest)
+    return html_page.page(
+        title,
+        [tag("div", *_first(first), class_=f"card {report.grade.value}"), tag("nav", links, aria_label="Sections")],
+        [_section(each, report) for each in rest],
+        library=get_plotlyjs(),
+        script=(files("canbase_qualification") / "report_page.js").read_text(encoding="utf-8"),
     )
 
 
-def _text(text: str) -> str:
-    """Escaped, on one line; code between backquotes, emphasis between asterisks."""
-    escaped = html.escape(printable(text, 4 * SENTENCE_LENGTH))
-    return EMPHASIS.sub(r"<em>\1</em>", STRONG.sub(r"<strong>\1</strong>", CODE.sub(r"<code>\1</code>", escaped)))
-
-
-def _first(section: Section) -> str:
+def _first(first: Section) -> list[Html]:
     """The first screen: the verdict stands out, and what it does not say comes beside what was assumed."""
-    verdict, *notes = section.paragraphs
-    told = "".join(f'<p class="soft">{_text(note)}</p>' for note in notes)
-    short, assumed = section.tables
-    return (
-        f'<p class="verdict">{_text(verdict)}</p>{told}{_terms(short)}<div class="two">'
-        f"<div><h2>{_text(assumed.caption)}</h2>{_terms(assumed)}{_bullets(section.facts)}</div>"
-        f"<div><h2>{_text(section.list_title)}</h2>{_bullets(section.items)}</div></div>"
+    verdict, *notes = first.paragraphs
+    short, assumed = first.tables
+    beside = tag("div", tag("h2", assumed.caption), _terms(assumed), bullets(map(marked, first.facts)))
+    missing = tag("div", tag("h2", first.list_title), bullets(map(marked, first.items)))
+    return [
+        tag("p", marked(verdict), class_="verdict"),
+        *(tag("p", marked(note), class_="soft") for note in notes),
+        _terms(short),
+        tag("div", beside, missing, class_="two"),
+    ]
+
+
+def _terms(of: Table) -> Html:
+    return terms((marked(what), marked(value)) for what, value in of.rows)
+
+
+def _section(of: Section, report: Report) -> Html:
+    code = tag("details", tag("summary", "robot.yaml as it took effect"), html_page.code(of.code)) if of.code else ""
+    return section(
+        of.key,
+        marked(of.title),
+        *(tag("p", marked(text)) for text in of.paragraphs),
+        *(_plots(report) if of.plot else ()),
+        *map(_table, of.tables),
+        bullets(map(marked, of.facts)),
+        bullets(map(marked, of.items)),
+        code,
     )
 
 
-def _terms(table: Table) -> str:
-    rows = "".join(f"<dt>{_text(what)}</dt><dd>{_text(value)}</dd>" for what, value in table.rows)
-    return f"<dl>{rows}</dl>"
+def _table(of: Table) -> Html:
+    columns = (tag("th", marked(name), scope="col", class_=_kind(of, at)) for at, name in enumerate(of.columns))
+    rows = (tag("tr", tag("th", marked(cells[0]), scope="row"), *map(_cell, cells[1:])) for cells in of.rows)
+    return table(columns, rows, caption=of.caption)
 
 
-def _bullets(items: tuple[str, ...]) -> str:
-    return f"<ul>{''.join(f'<li>{_text(item)}</li>' for item in items)}</ul>" if items else ""
+def _kind(of: Table, at: int) -> str:
+    return "number" if at and of.rows and all(NUMBER.match(cells[at]) for cells in of.rows) else ""
 
 
-def _section(section: Section, report: Report) -> str:
-    paragraphs = "".join(f"<p>{_text(text)}</p>" for text in section.paragraphs)
-    plots = _plots(report) if section.plot else ""
-    tables = "".join(map(_table, section.tables))
-    code = f"<details><summary>robot.yaml as it took effect</summary><pre>{html.escape(section.code)}</pre></details>"
-    return (
-        f'<section id="{section.key}"><h2>{_text(section.title)}</h2>{paragraphs}{plots}{tables}'
-        f"{_bullets(section.facts)}{_bullets(section.items)}{code if section.code else ''}</section>"
-    )
+def _cell(text: str) -> Html:
+    return tag("td", marked(text), class_="number" if NUMBER.match(text) else "long" if len(text) > 40 else "")
 
 
-def _table(table: Table) -> str:
-    head = "".join(_column(table, at) for at in range(len(table.columns)))
-    body = "".join(f"<tr>{''.join(_cell(at, cell) for at, cell in enumerate(row))}</tr>" for row in table.rows)
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{_attribute(table.caption)}"><table>'
-        f"<caption>{_text(table.caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-    )
-
-
-def _column(table: Table, at: int) -> str:
-    numbers = at > 0 and table.rows and all(NUMBER.match(row[at]) for row in table.rows)
-    kind = ' class="number"' if numbers else ""
-    return f'<th scope="col"{kind}>{_text(table.columns[at])}</th>'
-
-
-def _cell(at: int, text: str) -> str:
-    if at == 0:
-        return f'<th scope="row">{_text(text)}</th>'
-    kind = "number" if NUMBER.match(text) else ("long" if len(text) > 40 else "")
-    return f'<td class="{kind}">{_text(text)}</td>' if kind else f"<td>{_text(text)}</td>"
-
-
-def _attribute(text: str) -> str:
-    return html.escape(printable(text, SENTENCE_LENGTH), quote=True)
-
-
-def _plots(report: Report) -> str:
+def _plots(report: Report) -> list[Html]:
     if not named(report):
-        return ""
-    options = "".join(f"<option>{html.escape(name)}</option>" for name, _ in named(report))
-    return (
-        '<fieldset class="choice"><legend>Shown</legend>'
-        '<label><input type="radio" name="metric" value="distance_m" checked> distance</label>'
-        '<label><input type="radio" name="metric" value="time_s"> time</label></fieldset>'
-        '<div id="overview" class="plot" role="img" aria-label="Each run of each hazard, with its quantiles. The table '
-        'below has the same figures."></div>'
-        f'<label class="choice">Distribution of <select id="which">{options}</select></label>'
-        '<div id="curve" class="plot" role="img" aria-label="Share of the runs that stood by then"></div>'
-        f"{_data('overviews', {metric: overview(report, metric) for metric in ('distance_m', 'time_s')})}"
-        f"{_data('curves', curves(report))}"
-    )
-
-
-def _data(name: str, value: Any) -> str:
-    """Inside a script element: nothing in it ends that."""
-    text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    escaped = text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    return f'<script type="application/json" id="{name}">{escaped}</script>'
+        return []
+    choices = [
+        tag("label", tag("input", type="radio", name="metric", value=metric, checked=metric == METRICS[0]), f" {words}")
+        for metric, words in zip(METRICS, ("distance", "time"), strict=True)
+    ]
+    which = tag("select", *(tag("option", name) for name, _ in named(report)), id="which")
+    about = "Each run of each hazard, with its quantiles. The table below has the same figures."
+    return [
+        tag("fieldset", tag("legend", "Shown"), *choices, class_="choice"),
+        tag("div", id="overview", class_="plot", role="img", aria_label=about),
+        tag("label", "Distribution of ", which, class_="choice"),
+        tag("div", id="curve", class_="plot", role="img", aria_label="Share of the runs that stood by then"),
+        data({metric: overview(report, metric) for metric in METRICS}, id="overviews"),
+        data(curves(report), id="curves"),
+    ]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from canbase_runtime.version import installed_version
 
@@ -34,15 +34,6 @@ class Software:
 
     def __str__(self) -> str:
         return f"canbase {self.canbase} (sources {self.sources}), Python {self.python}, numpy {self.numpy}"
-
-    def plain(self) -> dict[str, str]:
-        """For JSON."""
-        return asdict(self)
-
-    @staticmethod
-    def of_plain(plain: Mapping[str, Any]) -> Software:
-        """From JSON. KeyError: something is missing."""
-        return Software(*(str(plain[name]) for name in ("canbase", "sources", "python", "numpy")))
 
 
 @cache

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from canbase_recording.recorded_inputs import NoInputsError
 
@@ -31,9 +32,28 @@ def head_of(line: str, most_bytes: int, part: str, version: int, what: str) -> M
     return head
 
 
-def finite(value: Any) -> float:
-    """A time [s]. Raises ValueError for NaN, infinity and what is no number."""
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{number} is no time")
-    return number
+Time = Annotated[float, Field(allow_inf_nan=False)]
+"""Monotonic [s]."""
+
+
+def readers(kinds: Mapping[str, tuple[Any, ...]]) -> Mapping[str, TypeAdapter[Any]]:
+    """By what a line is: its values behind that word and its time."""
+    whole: Any = tuple  # to mypy an alias with values in it is no type
+    shapes = {what: (str, Time, *values) for what, values in kinds.items()}
+    return {what: TypeAdapter(whole[shape]) for what, shape in shapes.items()}
+
+
+def read_call(values: Any, number: int, known: Mapping[str, TypeAdapter[Any]], of: str) -> Any:
+    """A line as a tuple of what it is, its time and its values. Raises NoInputsError; `of`: for people."""
+    try:
+        return known[values[0]].validate_python(values)
+    except ValidationError as error:
+        raise NoInputsError(f"line {number}: no input of {of} ({first_of(error)})") from error
+    except (KeyError, TypeError, IndexError) as error:
+        raise NoInputsError(f"line {number}: no input of {of} ({str(error)[:80]})") from error
+
+
+def first_of(error: ValidationError) -> str:
+    """What is wrong first, and where."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"[:200]

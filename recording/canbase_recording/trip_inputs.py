@@ -7,20 +7,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
+
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_recording.input_lines import finite, head_of, json_line
+from canbase_recording.input_lines import Time, first_of, head_of, json_line, read_call, readers
 from canbase_recording.recorded_inputs import NoInputsError
 from canbase_watchdog.input_ring import END, EXPIRE, FORMAT, FRAME, LEASE, MAX_INPUTS, START, SUSPEND, TICK, VERDICT
-from canbase_watchdog.latch import Entry, Mark, Past
+from canbase_watchdog.latch import Past
 
 LINE_BYTES: Final = 200_000
 """Of one line."""
-_COB_IDS: Final = range(0x800)
-_FRAME_BYTES, _DATAGRAM_BYTES = 8, 256
 
 Call = tuple[Any, ...]
 """What it is, its time [s], and its values, as the watchdog's loop noted it."""
@@ -30,7 +30,7 @@ Call = tuple[Any, ...]
 class RecordedVerdict:
     """From this time on [s] the watchdog was tripped for this cause (its number); 0: it was not."""
 
-    at_s: float
+    at_s: Time
     cause: int
     node_id: int
     detail: str
@@ -45,7 +45,7 @@ class TripHead:
     past: Past | None
     """The record on disk at the start of that watchdog."""
     trip: RecordedVerdict
-    wall_offset_s: float
+    wall_offset_s: Time
     """On top of a time: seconds since 1970."""
 
 
@@ -82,7 +82,7 @@ def trip_inputs(lines: Iterable[str]) -> TripInputs:
     for number, line in numbered:
         if number > MAX_INPUTS + 1:
             raise NoInputsError(f"line {number}: canbase writes no more than {MAX_INPUTS}")
-        call = _call(json_line(line, number, LINE_BYTES), number)
+        call = read_call(json_line(line, number, LINE_BYTES), number, _CALLS, "a watchdog")
         if call[0] == VERDICT:
             verdicts.append(RecordedVerdict(*call[1:]))
         else:
@@ -94,76 +94,30 @@ def trip_head(line: str) -> TripHead:
     """Of the first line. Raises NoInputsError."""
     head = head_of(line, LINE_BYTES, "watchdog", FORMAT, "a watchdog's trip")
     try:
-        trip, past = head["trip"], head["past"]
-        return TripHead(
-            robot=str(head["robot"]),
-            config=WatchdogConfig.from_json(json.dumps(head["config"])),
-            past=None if past is None else _past(past),
-            trip=RecordedVerdict(finite(trip["at_s"]), int(trip["cause"]), int(trip["node_id"]), str(trip["detail"])),
-            wall_offset_s=finite(head["wall_offset_s"]),
-        )
+        values = {name: head[name] for name in ("robot", "past", "trip", "wall_offset_s")}
+        return _HEAD.validate_python({**values, "config": WatchdogConfig.from_json(json.dumps(head["config"]))})
     except KeyError as error:
         raise NoInputsError(f"line 1: the key {error} is missing") from error
+    except ValidationError as error:
+        raise NoInputsError(f"line 1: a value is not what it must be: {first_of(error)}") from error
     except (TypeError, ValueError, AttributeError) as error:
         raise NoInputsError(f"line 1: a value is not what it must be: {str(error)[:200]}") from error
 
 
-def _past(values: Mapping[str, Any]) -> Past:
-    entry = dict(values["entry"])
-    return Past(Entry(**{**entry, "mark": Mark(entry["mark"])}), str(values["problem"]), int(values["sequence"]))
+def _hex(most: int) -> Any:
+    return Annotated[bytes, BeforeValidator(lambda text: bytes.fromhex(text)), Field(max_length=most)]
 
 
-def _call(values: Any, number: int) -> Call:
-    try:
-        what, at_s, *rest = values
-        call = what, finite(at_s), *_READ[what](rest)
-    except (KeyError, TypeError, ValueError) as error:
-        raise NoInputsError(f"line {number}: no input of a watchdog ({str(error)[:80]})") from error
-    return call
-
-
-def _bytes(text: Any, most: int) -> bytes:
-    data = bytes.fromhex(text)
-    if len(data) > most:
-        raise ValueError(f"{len(data)} bytes, at most {most}")
-    return data
-
-
-def _frame(values: list[Any]) -> Call:
-    cob_id, data = values
-    if type(cob_id) is not int or cob_id not in _COB_IDS:
-        raise ValueError(f"{cob_id} is no 11-bit identifier")
-    return cob_id, _bytes(data, _FRAME_BYTES)
-
-
-def _lease(values: list[Any]) -> Call:
-    datagram, uid, pid = values
-    return _bytes(datagram, _DATAGRAM_BYTES), *(None if each is None else int(each) for each in (uid, pid))
-
-
-def _tick(values: list[Any]) -> Call:
-    failed_since, errors = values
-    return math.inf if failed_since is None else finite(failed_since), int(errors)
-
-
-def _verdict(values: list[Any]) -> Call:
-    cause, node_id, detail = values
-    return int(cause), int(node_id), str(detail)
-
-
-def _nothing(values: list[Any]) -> Call:
-    if values:
-        raise ValueError("too many values")
-    return ()
-
-
-_READ: Final[Mapping[str, Callable[[list[Any]], Call]]] = {
-    START: _nothing,
-    FRAME: _frame,
-    LEASE: _lease,
-    TICK: _tick,
-    EXPIRE: _nothing,
-    SUSPEND: lambda values: (finite(values[0]),),
-    END: _nothing,
-    VERDICT: _verdict,
-}
+_HEAD: Final = TypeAdapter(TripHead)
+_CALLS: Final = readers(
+    {
+        START: (),
+        FRAME: (Annotated[int, Field(ge=0, lt=0x800, strict=True)], _hex(8)),
+        LEASE: (_hex(256), int | None, int | None),
+        TICK: (Annotated[Time | None, AfterValidator(lambda since: math.inf if since is None else since)], int),
+        EXPIRE: (),
+        SUSPEND: (Time,),
+        END: (),
+        VERDICT: (int, int, str),
+    }
+)
