@@ -193,8 +193,9 @@ class DriverCore:
                 node.clear_lost_heartbeat(now_s)
 
     def request_aim(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
-        """Go so far; `on_outcome` is called once, when it is there or has failed."""
-        if self._shutdown_requested:
+        """Go so far; `on_outcome` is called once, when it is there or has failed. What takes power away is obeyed in a
+        shutdown too: the record then keeps it off over the next start."""
+        if self._shutdown_requested and aim >= self._readiness.aim:
             on_outcome(Outcome(False, "refused: motor_driver is shutting down"))
         else:
             self._readiness.request(aim, now_s, on_outcome)

@@ -157,4 +157,4 @@ def test_a_defect_in_the_core_sends_quick_stops_ends_the_thread_and_is_kept(
         assert [data[:2] for data in last] == [b"\x02\0"] * 3
         assert not any(any(data[2:]) for data in last)
     assert around.truth.standing_s > 0.3
-    assert driver.try_reset().sentence == "refused: the control loop has ended"
+    assert driver.try_reset().sentence == "not confirmed: motor_driver has ended"

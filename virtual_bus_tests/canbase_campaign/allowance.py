@@ -42,18 +42,22 @@ class Allowance:
 
     ROWS = ("rolls out", "unreachable", "second fault", "late frames", "second master")
 
-    def __init__(self, name: str, ledger: Ledger, react_s: float, now_s: float, coasting: float) -> None:
-        """`react_s`: of one layer. `coasting`: of `envelope.coasting_share`."""
+    def __init__(
+        self, name: str, ledger: Ledger, react_s: float, now_s: float, coasting: float, pivot: float = 1.0
+    ) -> None:
+        """`react_s`: of one layer. `coasting`: of `envelope.coasting_share`. `pivot`: of `envelope.pivot_share`."""
         self._name, self._ledger, self._react_s = name, ledger, react_s
+        self._pivot, self._coasts = pivot, False
         self._envelopes = [Envelope(react_s, now_s, coasting) for _ in range(len(self.ROWS) + 1)]
 
     def order(self, tau_s: float, now_s: float) -> None:
         """An order with this τ is given."""
-        for envelope in self._envelopes:
-            envelope.order(tau_s, now_s)
+        for at, envelope in enumerate(self._envelopes):
+            envelope.order(tau_s * self._pivot if at and self._coasts else tau_s, now_s)
 
     def bound_s(self, tau_s: float, now_s: float, active: Active) -> float:
         """The greatest τ allowed now, when the base has `tau_s` [s]. To be called every step."""
+        self._coasts = active.coasting
         react_s, gives = self._react_s, (0.0, 0.0, 0.0, *(seconds for _, seconds in active.gives_s()))
         row, strict_s, bound_s = "", 0.0, 0.0
         for at, (envelope, more_s) in enumerate(zip(self._envelopes, gives, strict=True)):

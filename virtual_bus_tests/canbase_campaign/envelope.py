@@ -66,6 +66,16 @@ def coasting_share(drawn: DrawnRobot) -> float:
     return min(1.0, linear_mps2 / limits.deceleration_mps2, angular_radps2 / limits.angular_deceleration_radps2)
 
 
+def pivot_share(robot: Robot) -> float:
+    """A base of which one side is not driven turns about it, by what was ordered for both: so much is its τ greater.
+
+    The driven wheel has |v| + |w|·track/2 at most, and its turn, that divided by the track, needs this share of τ.
+    """
+    limits = robot.limits
+    share = 0.5 + limits.deceleration_mps2 / (limits.angular_deceleration_radps2 * robot.base.track_m)
+    return max(1.0, share)
+
+
 def notice_s(robot: Robot) -> float:
     """Longest time until one layer notices that it must stop the base [s]."""
     return _numbers(robot).notice_s

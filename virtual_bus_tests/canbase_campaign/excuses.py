@@ -32,7 +32,8 @@ class Excuse:
 
 EXCUSES = {
     "rolls out": Excuse(
-        "no motor brakes a side without power, or whose drive sees no motion: friction and slope alone slow it down",
+        "no motor brakes or drives a side without power or coupling, or whose drive sees no motion: friction and slope "
+        "alone slow it down, and the other side turns the base about it",
         20.0,
     ),
     "unreachable": Excuse(
@@ -109,7 +110,9 @@ EXCUSES = {
         "no drive follows setpoints: all brake by ramps of their own, and a turn ends when the base stands", 10.0
     ),
     "unproven standstill": Excuse(
-        "a dead encoder shows standstill, and its drive may push for stand_impulse_s before the power goes off", 10.0
+        "a dead encoder shows standstill, and its drive may push for stand_impulse_s before the power goes off; a "
+        "motor without its coupling shows nothing of the wheel, which rolls out",
+        10.0,
     ),
 }  # fmt: skip
 """Name → row."""

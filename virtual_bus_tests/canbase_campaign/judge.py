@@ -18,6 +18,7 @@ from canbase_campaign.envelope import (
     coasting_share,
     moving_s,
     notice_s,
+    pivot_share,
     react_s,
 )
 from canbase_campaign.excuses import STEP_S, Faults, Ledger
@@ -83,7 +84,7 @@ class Judge:
         self.react_s = self._one_s
         """Of the layers that the faults of this moment leave [s]."""
         self._faults = Faults(plan, now_s, self._one_s)
-        self._coasting = coasting_share(world.drawn)
+        self._coasting, self._pivot = coasting_share(world.drawn), pivot_share(world.robot)
         self._reach, self._strangers, self._shown = Reach(world), Strangers(world), Shown(world)
         self._envelope = self._allowance("envelope", self._one_s)
         self._wishes = Wishes(world.robot, now_s)
@@ -146,7 +147,7 @@ class Judge:
             self._violate("goal", problem)
 
     def _allowance(self, name: str, base_s: float) -> Allowance:
-        return Allowance(name, self.ledger, base_s, self._world.clock.now_s, self._coasting)
+        return Allowance(name, self.ledger, base_s, self._world.clock.now_s, self._coasting, self._pivot)
 
     def _look_at_faults(self, tau_s: float, now_s: float) -> None:
         """What is active at this moment."""

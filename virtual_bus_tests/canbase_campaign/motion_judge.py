@@ -164,11 +164,12 @@ class MotionJudge:
 
     def _unproven(self) -> bool:
         """A dead encoder shows a stand, and its drive has not given more torque yet than it may before it lets go, or
-        the wheel rolls out after that."""
+        the wheel rolls out after that. One without its motor rolls out without any encoder."""
         slower, drives = self._shown.fastest_mps < self._before_mps, self._world.drives
         self._before_mps = self._shown.fastest_mps
         rolls_out = slower and any(drives.roll(side) for side in drives.sides)
-        return self._shown.is_blind and (rolls_out or self._shown.pushed_blindly_s <= self._impulse_s)
+        unproven = self._shown.is_blind and self._shown.pushed_blindly_s <= self._impulse_s
+        return unproven or (rolls_out and (self._shown.is_blind or self._shown.is_uncoupled))
 
     def _standstill(self, now_s: float) -> tuple[str, str] | None:
         driver = self._world.driver

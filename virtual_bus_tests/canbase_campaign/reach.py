@@ -100,7 +100,7 @@ class Reach:
         return motor.goal_mps == 0.0 == motor.demand_mps
 
     def turning(self) -> list[tuple[int, int]]:
-        """Node id and axis of each wheel that turns with power."""
+        """Node id and axis of each wheel that turns with power: its motor is coupled to it."""
         base, nodes = self._world.drives.bench.base, self._world.drives.bench.nodes
         if base.resting:
             return []
@@ -108,7 +108,11 @@ class Reach:
         if not (left or right):
             return []
         turn = [(node_id, axis) for node_id, axis, side in self._wheels if (left if side == "left" else right)]
-        return [(node_id, axis) for node_id, axis in turn if nodes[node_id].axes[axis].motor.powered]
+        return [
+            (node_id, at)
+            for node_id, at in turn
+            if (axis := nodes[node_id].axes[at]).motor.powered and not axis.uncoupled
+        ]
 
     def heard(self, node_id: int) -> float:
         """When the drive last received what it monitors: heartbeats, requests that guard it, or setpoints."""
@@ -198,10 +202,12 @@ class Reach:
 
     def _is_weak(self, node: SimulatedNode) -> bool:
         """A quick stop, or a fault reaction, of one of its motors has hardly an effect, though its settings demand one;
-        or it has lost those."""
+        or it has lost those. Or it has less than LEAST_SHARE of the slope of its settings."""
         least_mps2 = self._least_mps2
-        weak = [axis for axis in node.axes if axis.motor.stop_mps2 < least_mps2]
-        return any(node.settings_lost or axis.stated_mps2 >= least_mps2 for axis in weak)
+        stopping = [axis for axis in node.axes if axis.motor.stop_mps2 < math.inf]
+        weak = [axis for axis in stopping if axis.motor.stop_mps2 < least_mps2]
+        softly = any(axis.faults.stop_share < LEAST_SHARE for axis in stopping)
+        return softly or any(node.settings_lost or axis.stated_mps2 >= least_mps2 for axis in weak)
 
     @staticmethod
     def _lies(node: SimulatedNode) -> bool:

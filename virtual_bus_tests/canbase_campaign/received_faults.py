@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from canbase_campaign.fault import LONG, Arguments, Change, Kind
+from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.stop_cause import StopCause
@@ -61,7 +62,7 @@ def contradiction(topic: str, message: Any) -> Any:
 def _other_driver(topic: str, message: DriverSnapshot) -> DriverSnapshot:
     """At the origin of its odometry and at standstill; as status, enabled where this one is not."""
     if topic == "odom":
-        odometry = replace(message.odometry, twist=replace(message.odometry.twist, linear_mps=0.0, angular_radps=0.0))
+        odometry = replace(message.odometry, twist=Twist2D.ZERO)
         return replace(message, odometry=odometry)
     enabled = message.state is DriverState.ENABLED
     return replace(message, state=DriverState.LATCHED if enabled else DriverState.ENABLED)

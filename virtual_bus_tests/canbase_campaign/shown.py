@@ -59,6 +59,11 @@ class Shown:
         return any(not axis.encoder.closes_loop for axis in self._axes)
 
     @property
+    def is_uncoupled(self) -> bool:
+        """A motor and its encoder have no coupling to their wheel: no sensor shows its motion."""
+        return any(axis.uncoupled for axis in self._axes)
+
+    @property
     def pushed_blindly_s(self) -> float:
         """How long a drive with such an encoder has given its rated torque, or less for longer, without a release."""
         pushed = zip(self._axes, self._pushed_s, strict=True)

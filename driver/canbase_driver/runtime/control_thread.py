@@ -128,7 +128,7 @@ class ControlLoop(threading.Thread):
                 break
             self._answer(number, outcome)
         for number in tuple(self._asked) if ended else ():
-            self._answer(number, Outcome(False, "refused: the control loop has ended"))
+            self._answer(number, Outcome(False, "not confirmed: motor_driver has ended"))
 
     def _answer(self, number: int, outcome: Outcome) -> None:
         name, on_outcome = self._asked.pop(number)

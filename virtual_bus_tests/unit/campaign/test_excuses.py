@@ -89,6 +89,22 @@ def test_without_an_excuse_the_speed_is_too_high_one_step_after_the_reaction() -
     assert ledger.excused_s == {}
 
 
+@pytest.mark.parametrize(("coasts", "tau_s", "holds"), [
+    (True, 0.29, True), (True, 0.31, False), (False, 0.29, False),
+])  # fmt: skip
+def test_the_driven_side_turns_the_base_about_one_without_power(coasts: bool, tau_s: float, holds: bool) -> None:
+    """0.2 s are ordered straight on for 0.5 s, of which the turn about one side takes 1.5 times as much."""
+    ledger = Ledger()
+    allowance = Allowance("envelope", ledger, 0.1, 0.0, 0.2, pivot=1.5)
+    within = []
+    for step in range(50):
+        ledger.step(True, step * STEP_S)
+        allowance.order(0.2, step * STEP_S)
+        within.append(tau_s <= allowance.bound_s(tau_s, step * STEP_S, Active(coasting=coasts)))
+    assert within[-1] is holds
+    assert bool(ledger.excused_s) is coasts
+
+
 def test_each_row_has_a_reason_and_a_duration() -> None:
     for excuse in EXCUSES.values():
         assert len(excuse.reason) > 30

@@ -8,6 +8,7 @@ from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.fault_reset import Outcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
+from canbase_runtime.latch_record import Mark
 from canbase_watchdog.watchdog import State as WatchdogState
 from support.chain_world import FORWARD, World
 
@@ -149,6 +150,21 @@ def test_an_activation_that_fails_is_taken_back_and_says_why(released: World) ->
 def test_a_reset_of_an_unconfigured_driver_is_refused(released: World) -> None:
     released.run(0.1)
     assert released.reset() == Outcome(False, "refused: lifecycle: unconfigured; configure it first")
+
+
+def test_a_driver_that_shuts_down_obeys_a_deactivation_and_its_record_keeps_it() -> None:
+    """At 0 s SIGTERM, at 0.05 s `deactivate` and then `activate`: the next start gets no power."""
+    world = World()
+    world.drive()
+    sentences: list[str] = []
+    world.core.request_shutdown()
+    world.run(0.05)
+    world.core.request_aim(Aim.CONFIGURED, world.now_s, lambda outcome: sentences.append(outcome.sentence))
+    world.core.request_aim(Aim.ACTIVE, world.now_s, lambda outcome: sentences.append(outcome.sentence))
+    assert sentences == ["refused: motor_driver is shutting down"]
+    world.run(5.0, lambda: world.core.finished)
+    assert world.powered == [False, False]
+    assert (world.core.record.mark, world.core.record.code) == (Mark.CLEAR, Aim.ACTIVE - Aim.CONFIGURED)
 
 
 def test_of_two_changes_at_once_the_second_is_refused(released: World) -> None:
