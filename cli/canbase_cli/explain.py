@@ -101,8 +101,8 @@ def explain(
 
 def recorded_robot(recording: Path, config: Path | None) -> tuple[Robot | None, str]:
     """The robot of --config, else the one that canbase has recorded beside an .asc file; and the name of its file."""
-    from canbase_recording.recorded_inputs import NoInputsError
-    from canbase_recording.replay_file import robot_beside
+    from canbase_recording.input_lines import NoInputsError
+    from canbase_recording.stop_file import robot_beside
 
     if config is not None:
         return load_config(config, quiet=True).robot, config.name

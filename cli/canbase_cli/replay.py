@@ -12,8 +12,8 @@ from canbase_runtime.terminal import FAILED, fail, load_config
 
 if TYPE_CHECKING:
     from canbase_config.robot import Robot
-    from canbase_recording.recorded_inputs import RecordedInputs
     from canbase_recording.replay_text import Begun
+    from canbase_recording.stop_file import StopFile
     from canbase_recording.trip_inputs import TripInputs
     from canbase_recording.velocity_inputs import VelocityInputs
 
@@ -39,14 +39,13 @@ def replay(
 ) -> None:
     """Feed a recorded stop to the real watchdog: would it have tripped, when, and why, beside what was recorded.
 
-    Also mux and safety filter (each decision) and the driver's limiter (setpoints). With --config, what another
-    configuration would have changed. Nothing is sent and no robot is needed. What a recording does not contain is not
-    replayed, and reported.
+    Also mux and safety filter (each decision). With --config, what another configuration would have changed. Nothing is
+    sent and no robot is needed. What a recording does not contain is not replayed, and reported.
 
-    Exit codes: 0 the replay does what was recorded, 1 it differs or the files cannot be read, 2 wrong command line or
-    robot.yaml.
+    Exit codes: 0 the replay does what was recorded, 1 it differs, nothing can be replayed or the files cannot be read,
+    2 wrong command line or robot.yaml.
     """
-    from canbase_recording.recorded_inputs import NoInputsError
+    from canbase_recording.input_lines import NoInputsError
 
     other = None if config is None else load_config(config, quiet=True).robot
     try:
@@ -109,30 +108,30 @@ def _trip(path: Path, other: Robot | None) -> Replay:
 
 
 def _stop(path: Path, other: Robot | None) -> Replay:
-    """Both files of the driver, and those of watchdog, mux and filter where they lie beside them."""
+    """The files of watchdog, mux and filter beside those of the driver."""
     from canbase_recording import replay_text as words
-    from canbase_recording.replay_file import read_inputs, robot_of, trip_beside, velocity_beside
+    from canbase_recording.replay_file import trip_beside, velocity_beside
+    from canbase_recording.stop_file import read_stop
 
-    inputs = read_inputs(path)
-    trip, velocity = trip_beside(path, inputs), velocity_beside(path, inputs)
+    stop = read_stop(path)
+    trip, velocity = trip_beside(path, stop), velocity_beside(path, stop)
     parts = (
-        _not_replayed(words.NO_WATCHDOG) if trip is None else _watchdog(trip[1], trip[0], inputs),
-        _not_replayed(words.NO_VELOCITY) if velocity is None else _beside(velocity[1], velocity[0], inputs, other),
-        _setpoints(inputs, robot_of(inputs)),
+        _not_replayed(words.NO_WATCHDOG) if trip is None else _watchdog(trip[1], trip[0], stop),
+        _not_replayed(words.NO_VELOCITY) if velocity is None else _beside(velocity[1], velocity[0], stop, other),
     )
     values: dict[str, Any] = {
-        "stop": {"by": inputs.stopped_by, "cause": inputs.cause, "at_s": inputs.at_s - inputs.began_s},
-        "versions": dict(inputs.versions),
+        "stop": {"by": stop.stopped_by, "cause": stop.cause, "at_s": stop.at_s - stop.began_s},
+        "versions": dict(stop.versions),
         "not_replayed": [why for part, _, _ in parts for why in part.pop("not_replayed", ())],
     }
-    lines = [f"stop by {inputs.stopped_by}: {inputs.cause} ({inputs.detail}), at {values['stop']['at_s']:.3f} s"]
+    lines = [f"stop by {stop.stopped_by}: {stop.cause} ({stop.detail}), at {values['stop']['at_s']:.3f} s"]
     for part, part_lines, _ in parts:
         values |= part
         lines += part_lines
-    if other is not None:
-        values["other_robot_yaml"], more = _with_other(inputs, other, trip and trip[1])
+    if other is not None and trip is not None:
+        values["other_robot_yaml"], more = _with_other(stop, other, trip[1])
         lines += more
-    return values, lines, all(agrees for _, _, agrees in parts)
+    return values, lines, len(values["not_replayed"]) < len(parts) and all(agrees for _, _, agrees in parts)
 
 
 def _not_replayed(why: str) -> Replay:
@@ -149,9 +148,9 @@ def _watchdog(own: TripInputs, name: str, zero: Begun) -> Replay:
     return {"watchdog": words.watchdog_values(zero, found)}, list(words.watchdog_lines(zero, found)), agrees
 
 
-def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot | None) -> Replay:
+def _beside(own: VelocityInputs, name: str, inputs: StopFile, other: Robot | None) -> Replay:
     """A file of another version is no reason not to replay the rest."""
-    from canbase_recording.recorded_inputs import NoInputsError
+    from canbase_recording.input_lines import NoInputsError
 
     try:
         return _mux_and_filter(own, name, inputs, other)
@@ -159,29 +158,11 @@ def _beside(own: VelocityInputs, name: str, inputs: RecordedInputs, other: Robot
         return _not_replayed(f"mux and filter: cannot tell, {name}: {error}")
 
 
-def _setpoints(inputs: RecordedInputs, robot: Robot) -> Replay:
+def _with_other(stop: StopFile, other: Robot, own: TripInputs) -> tuple[dict[str, Any], list[str]]:
+    """The watchdog, by its own file."""
     from canbase_recording import replay_text as words
-    from canbase_recording.replay_setpoints import replay_setpoints
-
-    setpoints = replay_setpoints(inputs, robot)
-    values = {"driver": words.setpoint_values(inputs, setpoints)}
-    return values, list(words.setpoint_lines(inputs, setpoints)), not setpoints.differences
-
-
-def _with_other(inputs: RecordedInputs, other: Robot, own: TripInputs | None) -> tuple[dict[str, Any], list[str]]:
-    """The watchdog by its own file, where there is one, and the driver's setpoints."""
-    from canbase_config.derive import watchdog_config
-    from canbase_recording import replay_text as words
-    from canbase_recording.replay_compare import compare, refuse_other_drives
+    from canbase_recording.replay_compare import compare
     from canbase_recording.replay_trip import replay_trip
 
-    refuse_other_drives(inputs.watchdog, watchdog_config(other))
-    values, told, _ = _setpoints(inputs, other)
-    indented = [f"  {line}" for line in told]
-    if own is None:
-        return values, ["with the other robot.yaml:", *indented]
-    comparison = compare(inputs, other, lambda config: replay_trip(own, config))
-    return words.comparison_values(inputs, comparison) | values, [
-        *words.comparison_lines(inputs, comparison),
-        *indented,
-    ]
+    comparison = compare(stop, other, lambda config: replay_trip(own, config))
+    return words.comparison_values(stop, comparison), list(words.comparison_lines(stop, comparison))

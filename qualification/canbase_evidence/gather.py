@@ -29,8 +29,9 @@ from canbase_evidence.software import Software
 from canbase_evidence.standing import Finding, Part, Standing
 from canbase_hazards import catalogue
 from canbase_qualification.software import software as qualification_software
-from canbase_recording.recorded_inputs import NoInputsError
-from canbase_recording.replay_file import INPUTS_SUFFIX, robot_beside
+from canbase_recording.input_lines import NoInputsError
+from canbase_recording.replay_file import INPUTS_SUFFIX
+from canbase_recording.stop_file import read_stop
 from canbase_runtime.version import installed_version
 
 INDEX: Final = "index.html"
@@ -223,18 +224,17 @@ def _recording(folder: Folder, path: Path) -> recorded.RecordedStop:
     copy = folder.root / name
     folder.put("recordings", copy.with_suffix(".json").name, taken(beside))
     try:
-        robot = robot_beside(copy)
-        told = json.loads(copy.with_suffix(".json").read_bytes())
+        stop = read_stop(copy)
         return recorded.RecordedStop(
             file=name,
-            at_unix_s=float(told["at_s"]) + float(told["wall_offset_s"]),
-            stopped_by=str(told["stopped_by"]),
-            cause=str(told["cause"]),
-            detail=str(told["detail"]),
-            version=str(told["versions"]["canbase"]).removesuffix(_COMPILED),
-            robot=robot,
+            at_unix_s=stop.at_s + stop.wall_offset_s,
+            stopped_by=stop.stopped_by,
+            cause=stop.cause,
+            detail=stop.detail,
+            version=stop.versions["canbase"].removesuffix(_COMPILED),
+            robot=stop.robot,
         )
-    except (NoInputsError, KeyError, TypeError, ValueError, AttributeError, RecursionError):
+    except (NoInputsError, KeyError):
         return _unusable(name, "with a .json file that is not one of this canbase")
 
 

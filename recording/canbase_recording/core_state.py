@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from canbase_recording.recorded_inputs import NoInputsError
+from canbase_recording.input_lines import NoInputsError
 from canbase_runtime import latch_record
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.source_standing import SourceStanding

@@ -8,7 +8,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from canbase_recording.recorded_inputs import NoInputsError
+
+class NoInputsError(Exception):
+    """A file is none of canbase's recordings of a stop, or of another version. The text says what is wrong."""
 
 
 def json_line(line: str, number: int, most_bytes: int) -> Any:

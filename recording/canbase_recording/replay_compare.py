@@ -15,8 +15,9 @@ from canbase_config.derive import watchdog_config
 from canbase_config.robot import Robot
 from canbase_config.watchdog import WatchdogConfig, WatchedLayout
 from canbase_recording.config_changes import Change, changes, of_the_watchdog
-from canbase_recording.recorded_inputs import NoInputsError, RecordedInputs
+from canbase_recording.input_lines import NoInputsError
 from canbase_recording.replay_trip import Replayed, Trip
+from canbase_recording.stop_file import StopFile
 
 SAME_S: Final = 0.0005
 """Two replays of the same inputs differ by less where nothing has changed [s]."""
@@ -57,7 +58,7 @@ Replay = Callable[[WatchdogConfig], tuple[Replayed, ...]]
 """The lives of the watchdog that ran, with this configuration."""
 
 
-def compare(inputs: RecordedInputs, other: Robot, replay: Replay) -> Comparison:
+def compare(inputs: StopFile, other: Robot, replay: Replay) -> Comparison:
     """Raises NoInputsError where the other robot has other drives: then the frames mean something else."""
     config = watchdog_config(other)
     refuse_other_drives(inputs.watchdog, config)

@@ -7,9 +7,7 @@ from collections.abc import Iterator
 from typing import Any, Final, Protocol
 
 from canbase_driver.supervision.watchdog_link import CAUSES
-from canbase_recording.recorded_inputs import RecordedInputs
 from canbase_recording.replay_compare import Comparison, Difference
-from canbase_recording.replay_setpoints import SetpointReplay
 from canbase_recording.replay_trip import Replayed, Trip, WatchdogReplay
 
 NO_WATCHDOG: Final = "watchdog: cannot tell, since its file watchdog_….jsonl (one for each trip) is not beside it"
@@ -101,38 +99,6 @@ def difference_text(inputs: Begun, found: Difference) -> str:
     when = f"{abs(found.earlier_s):.3f} s {_later(-found.earlier_s)}"
     cause = "" if before.cause is after.cause else f" by another cause, {CAUSES.get(int(after.cause or 0), 'unknown')}"
     return f"trips {when}{cause}{why}"
-
-
-def setpoint_lines(inputs: RecordedInputs, found: SetpointReplay) -> Iterator[str]:
-    """The driver: the setpoints that cmd_vel orders, beside the recorded ones."""
-    if not found.compared:
-        yield "driver: it followed no commands in this recording"
-        return
-    yield (
-        f"driver: {found.compared} cycles in which it followed cmd_vel; setpoints differ by at most "
-        f"{found.greatest_mps:.4f} m/s (tolerance {found.tolerance_mps:.4f} m/s)"
-    )
-    for each in found.differences:
-        span = f"from {_at(inputs, each.from_s)} to {_at(inputs, each.until_s)}"
-        yield f"  DIFFERS {span}: recorded {each.recorded_mps:.3f} m/s, replayed {each.replayed_mps:.3f} m/s"
-
-
-def setpoint_values(inputs: RecordedInputs, found: SetpointReplay) -> dict[str, Any]:
-    """The same, for JSON."""
-    return {
-        "compared": found.compared,
-        "greatest_mps": found.greatest_mps,
-        "tolerance_mps": found.tolerance_mps,
-        "differences": [
-            {
-                "from_s": each.from_s - inputs.began_s,
-                "until_s": each.until_s - inputs.began_s,
-                "recorded_mps": each.recorded_mps,
-                "replayed_mps": each.replayed_mps,
-            }
-            for each in found.differences
-        ],
-    }
 
 
 def watchdog_values(inputs: Begun, found: WatchdogReplay) -> dict[str, Any]:

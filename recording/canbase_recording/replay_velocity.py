@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from canbase_config.robot import Robot
 from canbase_recording.core_state import BROKEN, restore
-from canbase_recording.recorded_inputs import NoInputsError
+from canbase_recording.input_lines import NoInputsError
 from canbase_recording.velocity_inputs import Call, VelocityConfig, VelocityInputs
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.latch_record import Found, Mark, Record

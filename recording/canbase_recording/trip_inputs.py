@@ -14,8 +14,7 @@ from typing import Annotated, Any, Final
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 
 from canbase_config.watchdog import WatchdogConfig
-from canbase_recording.input_lines import Time, first_of, head_of, json_line, read_call, readers
-from canbase_recording.recorded_inputs import NoInputsError
+from canbase_recording.input_lines import NoInputsError, Time, first_of, head_of, json_line, read_call, readers
 from canbase_watchdog.input_ring import END, EXPIRE, FORMAT, FRAME, LEASE, MAX_INPUTS, START, SUSPEND, TICK, VERDICT
 from canbase_watchdog.latch import Past
 

@@ -16,8 +16,7 @@ from canbase_config.mux import Mux as MuxSection
 from canbase_config.robot import Base, Limits, Rates
 from canbase_config.safety import Safety
 from canbase_recording.core_state import array
-from canbase_recording.input_lines import Time, first_of, head_of, json_line, read_call, readers
-from canbase_recording.recorded_inputs import NoInputsError
+from canbase_recording.input_lines import NoInputsError, Time, first_of, head_of, json_line, read_call, readers
 from canbase_velocity.clearance import Points
 from canbase_velocity.input_ring import FORMAT, MAX_INPUTS
 from canbase_velocity.placement import Placement

@@ -74,7 +74,7 @@ def commissioned(robot_yaml: Path) -> Path:
 def recording(folder: Path, config: Path, name: str = "stop_a", **changes: Any) -> Path:
     folder.mkdir(exist_ok=True)
     head = {"format": 1, "stopped_by": "watchdog", "cause": "watchdog tripped", "detail": ODD, "at_s": 5.0}
-    told = {**head, "wall_offset_s": 1795500000.0, **about(load_robot(config).robot), **changes}
+    told = {**head, "began_s": 1.0, "wall_offset_s": 1795500000.0, **about(load_robot(config).robot), **changes}
     (folder / f"{name}.json").write_text(json.dumps(told))
     return Path(shutil.copy(FRAMES, folder / f"{name}.asc"))
 

@@ -66,7 +66,8 @@ def test_the_robot_that_was_recorded_beside_a_black_box_is_taken_and_another_fil
         beside.write_text(content)
         code, out, err = run("explain", str(recording))
         assert (code, "without robot.yaml" in out, "stop.json" in err) == (0, True, True), content
-    beside.write_text(json.dumps(about(load_robot(sample("bench")).robot)))
+    head = {"format": 1, "stopped_by": "watchdog", "cause": "", "detail": "", "at_s": 5.0, "began_s": 0.0}
+    beside.write_text(json.dumps({**head, "wall_offset_s": 0.0, **about(load_robot(sample("bench")).robot)}))
     code, out, err = run("explain", str(recording))
     assert (code, err) == (0, "")
     assert "read with stop.json" in out

@@ -19,9 +19,10 @@ from canbase_campaign.twins import JOYSTICK
 from canbase_cli.main import app
 from canbase_config.robot import Robot
 from canbase_recording.core_state import restore
-from canbase_recording.recorded_inputs import NoInputsError
-from canbase_recording.replay_file import read_inputs, read_velocity, velocity_beside
+from canbase_recording.input_lines import NoInputsError
+from canbase_recording.replay_file import read_velocity, velocity_beside
 from canbase_recording.replay_velocity import causes, replay_velocity
+from canbase_recording.stop_file import read_stop
 from canbase_recording.velocity_inputs import VelocityInputs, velocity_inputs
 from support.recorded_stops import record_in_a_copy
 
@@ -124,7 +125,7 @@ def run(*arguments: object) -> tuple[int, str]:
 
 def test_the_command_replays_it_beside_the_stop_and_alone(folder: Path) -> None:
     stop = folder / "estop" / "estop.asc"
-    assert velocity_beside(stop, read_inputs(stop)) is not None
+    assert velocity_beside(stop, read_stop(stop)) is not None
     for file in (stop, folder / "estop" / "velocity_estop_0.jsonl"):
         code, output = run(file)
         assert "decisions of their own file velocity_estop_0.jsonl" in output
