@@ -122,7 +122,7 @@ def stuck_s(robot: Robot) -> float:
     """The time for which a driver that repeats its setpoints is followed after an order of zero [s].
 
     Until no other order may be under way, and the jerk-limited ramp has lost the tolerance of the fastest wheel, also
-    on a curve or in place. Setpoints within the tolerance count as creeping (watchdog/creep.py).
+    on a curve or in place. Setpoints within the tolerance count as creeping (watchdog/setpoint_at_rest.py).
     """
     limits = robot.limits
     slack_mps = robot.watchdog.target_tolerance_mps + max(abs(bit) for bit in _bits_mps(robot))

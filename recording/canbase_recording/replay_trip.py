@@ -165,7 +165,7 @@ def _verdicts(
     inputs: TripInputs, config: WatchdogConfig, from_s: float, past: Any, until_s: float = float("inf")
 ) -> Iterator[Trip]:
     """The trips of a watchdog that is fed from `from_s` on."""
-    watchdog = Watchdog(config, from_s, past, echo=config.hears_itself)
+    watchdog = Watchdog(config, from_s, past, loopback=config.hears_itself)
     verdict = FINE
     for call in inputs.calls:
         if not from_s <= call[1] <= until_s:

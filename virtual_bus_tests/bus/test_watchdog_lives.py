@@ -80,7 +80,7 @@ class Rig:
 
     def _run(self) -> None:
         try:
-            main._lives(self.config, self.record, self.asked)
+            main._live_until_signal(self.config, self.record, self.asked)
         except BaseException as error:  # noqa: BLE001 - the test looks at it
             self.failure = error
 

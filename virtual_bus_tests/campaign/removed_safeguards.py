@@ -41,7 +41,7 @@ from canbase_watchdog.hard_braking import HardBraking
 from canbase_watchdog.ladder import RUNGS, Step
 from canbase_watchdog.latch import Past
 from canbase_watchdog.slowing import SlowingWatch
-from canbase_watchdog.standing import StandWatch
+from canbase_watchdog.standstill import StandstillWatch
 from canbase_watchdog.stopper import Stopper
 from canbase_watchdog.trip_cause import FINE, TripCause
 from canbase_watchdog.unasked_torque import UnaskedTorque
@@ -164,7 +164,7 @@ def _no_quick_stop() -> None:
     """The PDO is sent from "disable voltage" on."""
     word = Stopper._stop_word
     late = Step.DISABLE_VOLTAGE
-    Stopper._stop_word = lambda self, now_s: word(self, now_s) if self.climb.step >= late else []  # type: ignore[method-assign]
+    Stopper._stop_word = lambda self, now_s: word(self, now_s) if self.ladder.step >= late else []  # type: ignore[method-assign]
 
 
 def _no_pre_operational() -> None:
@@ -182,7 +182,7 @@ WITHOUT_RUNG: dict[Step, Callable[[], None]] = {
     Step.QUICK_STOP: _no_quick_stop,
     Step.PRE_OPERATIONAL: _no_pre_operational,
     Step.DISABLE_VOLTAGE: _no_disable_voltage,
-    Step.HEARTBEAT_WITHHELD: _put(Watchdog, "_beats", property(lambda self: True)),
+    Step.HEARTBEAT_WITHHELD: _put(Watchdog, "_sends_heartbeat", property(lambda self: True)),
     Step.RESET_NODE: _put(Stopper, "_reset_node", lambda self, now_s: []),
 }
 """The ladder is climbed as it was; what the rung sends is not sent."""
@@ -224,7 +224,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "ladder:braking": _put(ladder.Braking, "allowed_mps", lambda self, from_mps, elapsed_s: math.inf),
     "ladder:slowing": _put(SlowingWatch, "fails", NEVER),
     "ladder:faulty_sensor": _put(Axis, "trusted", property(lambda self: True)),
-    "ladder:sudden": _both(_put(StandWatch, "sudden", NEVER), _put(StandWatch, "unproven", NEVER)),
+    "ladder:sudden": _both(_put(StandstillWatch, "sudden", NEVER), _put(StandstillWatch, "unproven", NEVER)),
     "watchdog:unasked_torque": _both(_put(UnaskedTorque, "is_due", NEVER), _put(UnaskedTorque, "is_dead", NEVER)),
     "watchdog:hard_braking": _put(HardBraking, "on_lease", lambda self, lease, now_s: None),
     "watchdog:lease_times": _put(lease, "judge", lambda new, last, timeout_s, now_s: None),

@@ -44,7 +44,7 @@ _DRIVER_HEEDS = "power:command_not_zero+driver:reset_needs_zero+driver:zero_befo
 _MISSING = "watchdog:motion_missing+driver:stalled"
 _MOTION = f"watchdog:feedback_implausible+{_MISSING}+watchdog:twist_outside"
 _SENSORS = (
-    "watchdog:halted+watchdog:jolts+watchdog:ghost+watchdog:drift+watchdog:unseen+watchdog:vain+watchdog:strained+"
+    "watchdog:halted+watchdog:velocity_jumps+watchdog:ghost+watchdog:drift+watchdog:unseen+watchdog:vain+watchdog:strained+"
     "watchdog:behind+driver:stalled+watchdog:twist_outside+watchdog:motion_outside"
 )
 _NO_MOTION = ("encoder_lost", "wheel_blocked", "encoder_intermittent", "frozen_encoder")
@@ -80,11 +80,11 @@ NEEDS: tuple[Need, ...] = (
     Need("watchdog:latch", ("velocity_hangs", "lease_lost", "driver_hangs")),
     Need("watchdog:stop_record", ("all_processes_restart", "watchdog_dies", "encoder_lost", "lease_lost")),
     # watchdog: detectors of the rows above, of policy.OF_THE_SETPOINTS, IMPLAUSIBLE and MISSING
-    Need("watchdog:halt", ("driver_ignores_zero", "driver_repeats"), "watchdog:creep"),
-    Need("watchdog:creep", ("driver_ignores_zero", "driver_repeats"), "watchdog:halt"),
-    Need("watchdog:pair", _MAD),
+    Need("watchdog:ramp_to_zero", ("driver_ignores_zero", "driver_repeats"), "watchdog:setpoint_at_rest"),
+    Need("watchdog:setpoint_at_rest", ("driver_ignores_zero", "driver_repeats"), "watchdog:ramp_to_zero"),
+    Need("watchdog:left_right", _MAD),
     Need("watchdog:halted", _LIES, "watchdog:twist_outside+" + _MISSING),
-    Need("watchdog:jolts", _LIES, _SENSORS.replace("watchdog:jolts+", "")),
+    Need("watchdog:velocity_jumps", _LIES, _SENSORS.replace("watchdog:velocity_jumps+", "")),
     Need("watchdog:ghost", _LIES, _SENSORS.replace("watchdog:ghost+", "")),
     Need("watchdog:drift", _LIES, _SENSORS.replace("watchdog:drift+", "")),
     Need("watchdog:unseen", _NO_MOTION, _SENSORS.replace("watchdog:unseen+", "")),

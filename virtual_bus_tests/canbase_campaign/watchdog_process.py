@@ -71,7 +71,7 @@ class WatchdogProcess(Process):
 
     def _on_lease(self, datagram: bytes) -> None:
         self.core.on_lease(datagram, None, self.clock.now_s)
-        if self.core.owes_the_flag:  # as loop.py does
+        if self.core.has_unreported_flag:  # as loop.py does
             self._on_tick()
 
     def hear(self, cob_id: int, data: bytes) -> None:

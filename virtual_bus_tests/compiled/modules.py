@@ -21,9 +21,10 @@ HOT = {
     "canbase_config": "watchdog",
     "canbase_runtime": "driver_state latch_record source_standing stop_cause watchdog_view",
     "canbase_watchdog": (
-        "bus_health copies counts creep envelope frames ghost guarding halt ladder latch lease motion_evidence "
-        "observer overshoot pair plausibility policy power_and_motion second_master slowing standing stopper "
-        "stopping_distance tally torque trip_cause twist unasked_torque view watchdog"
+        "bad_cycles bus_health copies counts envelope frames ghost guarding ladder latch lease left_right "
+        "motion_evidence observer overshoot plausibility policy power_and_motion ramp_to_zero second_master "
+        "setpoint_at_rest slowing standstill stopper stopping_distance torque_evidence trip_cause twist "
+        "unasked_torque view watchdog"
     ),
     "canbase_driver": (
         "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "

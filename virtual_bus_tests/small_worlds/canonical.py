@@ -45,7 +45,7 @@ IGNORED = {
     ),
     "a text for people": "Verdict.detail Decision.detail Entry.detail Finding.detail Record.detail",
     "what was published last": (
-        "VelocityProcess._told VelocityProcess._mux_told Watchdog._told DriverProcess._told Axis._told "
+        "VelocityProcess._told VelocityProcess._mux_told Watchdog._reported_status DriverProcess._told Axis._told "
         "DriverProcess.snapshot CanopenNode._measures CanopenNode.report NodeBoot.report"
     ),
     "when a state is published again that did not change": (
@@ -59,8 +59,8 @@ IGNORED = {
     ),
     "a place on an endless way: the steps between two samples decide, and both are those of now": (
         "DriverCore._feed Axis.travel Axis.encoder_offset Stillness._travel_m StoppingDistance._travel_m "
-        "Plausibility._counts Plausibility._counts_before PushWatch._counts PushWatch._counts_before "
-        "StandWatch._counts Push._seen_m"
+        "Plausibility._counts Plausibility._counts_before TorqueWatch._counts TorqueWatch._counts_before "
+        "StandstillWatch._counts Push._seen_m"
     ),
     "a place that is at most one sample from the newest one, or the same at standstill": (
         "Stillness._anchor_m StoppingDistance._from_m Push._counted_m"

@@ -83,7 +83,7 @@ class WatchdogBox:
         now_s = self._clock.now_s
         self._ring.note((input_ring.TICK, now_s, self._watchdog._failed_since, 0))
         self._tick()
-        due = self._watch.look(self._watchdog.core, now_s)
+        due = self._watch.due_trip(self._watchdog.core, now_s)
         trip = due or self._watch.open
         if trip is not None and trip not in self.trips[-1:]:
             self.trips.append(trip)

@@ -27,7 +27,7 @@ class Copies:
         self._data = b""
         self._frame_at = self.at = -math.inf
 
-    def take(self, data: bytes, now_s: float) -> bool:
+    def note_frame(self, data: bytes, now_s: float) -> bool:
         """One more frame, at the monotonic time `now_s` [s]. Whether it is a copy."""
         is_copy = data == self._data and now_s - self._frame_at <= COPY_S
         if is_copy:
@@ -53,9 +53,9 @@ class _Share:
 class SentAgain:
     """The copies of SYNCs, of setpoints and of this watchdog's own heartbeats, counted since the SYNCs have some."""
 
-    def __init__(self, *, echo: bool) -> None:
-        """`echo`: the frames of this watchdog come back to it, and their copies with them."""
-        self._echo = echo
+    def __init__(self, *, loopback: bool) -> None:
+        """`loopback`: the frames of this watchdog come back to it, and their copies with them."""
+        self._loopback = loopback
         self._sync, self._own = Copies(), Copies()
         self._setpoints: dict[int, Copies] = {}
         self._begin()
@@ -66,7 +66,7 @@ class SentAgain:
     def on_sync(self, now_s: float) -> None:
         """A SYNC, at the monotonic time `now_s` [s]."""
         copied_at = self._sync.at
-        is_copy = self._sync.take(b"", now_s)
+        is_copy = self._sync.note_frame(b"", now_s)
         if is_copy and now_s - copied_at > WITHIN_S:
             self._begin()
             self._of_syncs.frames = 1
@@ -77,16 +77,16 @@ class SentAgain:
         copies = self._setpoints.get(cob_id)
         if copies is None:
             copies = self._setpoints[cob_id] = Copies()
-        self._of_setpoints.count(copies.take(data, now_s))
+        self._of_setpoints.count(copies.note_frame(data, now_s))
 
     def on_own(self, now_s: float) -> None:
         """A heartbeat 77Eh of this watchdog's node."""
-        self._of_own.count(self._own.take(b"", now_s))
+        self._of_own.count(self._own.note_frame(b"", now_s))
 
     def is_likely(self, now_s: float) -> bool:
         """SYNCs have copies now, and nothing else lacks the copies that it would have."""
         if now_s - self._sync.at > WITHIN_S:
             return False
         share = self._of_syncs.copies / self._of_syncs.frames
-        others = (self._of_setpoints, self._of_own) if self._echo else (self._of_setpoints,)
+        others = (self._of_setpoints, self._of_own) if self._loopback else (self._of_setpoints,)
         return all(other.copies > 0 or share * other.frames < EXPECTED for other in others)

@@ -36,7 +36,7 @@ class Life:
         """Its travel since the last sample; True, and a new beginning, where that is a sign of life."""
         self._at_m += step_m
         self._low_m, self._high_m = min(self._low_m, self._at_m), max(self._high_m, self._at_m)
-        lives = self._high_m - self._low_m >= self._least_m
-        if lives:
+        moved = self._high_m - self._low_m >= self._least_m
+        if moved:
             self.begin()
-        return lives
+        return moved

@@ -71,7 +71,7 @@ class Peak:
         past.append((value, end))
 
 
-class Way:
+class DirectionBounds:
     """One way to go (forward, backward, to the left, to the right): what is ordered that way, and what is allowed."""
 
     def __init__(self, ceiling: float, hold_s: float, now_s: float) -> None:
@@ -88,7 +88,7 @@ class Way:
         self._high.set(value, now_s, until)
         self._low.set(-value, now_s, until)
 
-    def look(self, now_s: float) -> None:
+    def update_orders(self, now_s: float) -> None:
         """Bring the most and the least of what was ordered up to date."""
         self.most, self.least = self._high.greatest(now_s), -self._low.greatest(now_s)
         self.level = max(self.level, self.most)
@@ -138,15 +138,17 @@ class Bounds:
         one, other = arm_m * self.angular_low, arm_m * self.angular_high
         return self.linear_low + min(one, other), self.linear_high + max(one, other)
 
-    def pairs(self, lefts: Sequence[float], rights: Sequence[float], track_m: float, tolerance_mps: float) -> str:
+    def all_left_right(
+        self, lefts: Sequence[float], rights: Sequence[float], track_m: float, tolerance_mps: float
+    ) -> str:
         """The same for each wheel of the left side with each one of the right: the first reason."""
         for left_mps in lefts:
             for right_mps in rights:
-                if why := self.pair(left_mps, right_mps, track_m, tolerance_mps):
+                if why := self.left_right(left_mps, right_mps, track_m, tolerance_mps):
                     return why
         return ""
 
-    def pair(self, left_mps: float, right_mps: float, track_m: float, tolerance_mps: float) -> str:
+    def left_right(self, left_mps: float, right_mps: float, track_m: float, tolerance_mps: float) -> str:
         """Why two wheels that are each allowed are not so together, empty when they are."""
         linear, angular = (left_mps + right_mps) / 2.0, (right_mps - left_mps) / track_m
         slack = 2.0 * tolerance_mps / track_m
@@ -164,13 +166,13 @@ class Envelope:
         """Rule 4: open at the monotonic time `now_s` [s]."""
         self._config = config
         ceilings = (config.linear_mps, config.linear_mps, config.angular_radps, config.angular_radps)
-        self._ways = tuple([Way(ceiling, config.order_hold_s, now_s) for ceiling in ceilings])
+        self._directions = tuple([DirectionBounds(ceiling, config.order_hold_s, now_s) for ceiling in ceilings])
         self._at = now_s
 
     def order(self, linear_mps: float, angular_radps: float, now_s: float) -> None:
         """A lease that counts. What it orders above the configured limits allows no more than they do."""
         until = now_s + self._config.lease_timeout_s
-        forward, backward, left, right = self._ways
+        forward, backward, left, right = self._directions
         forward.order(linear_mps, now_s, until)
         backward.order(-linear_mps, now_s, until)
         left.order(angular_radps, now_s, until)
@@ -187,23 +189,23 @@ class Envelope:
             self._fall_hard(min(elapsed_s, hard_s))
         else:
             self._follow_orders(elapsed_s, now_s)
-        forward, backward, left, right = self._ways
+        forward, backward, left, right = self._directions
         return Bounds(-backward.level, forward.level, -right.level, left.level)
 
     def _fall_hard(self, elapsed_s: float) -> None:
         config = self._config
-        forward, backward, left, right = self._ways
+        forward, backward, left, right = self._directions
         linear_s = max(forward.level, backward.level) / config.deceleration_mps2
         angular_s = max(left.level, right.level) / config.angular_deceleration_radps2
         kept = _kept(elapsed_s, max(linear_s, angular_s) * config.emergency_share)
-        for way in self._ways:
-            way.cease()
-            way.fall(kept)
+        for direction in self._directions:
+            direction.cease()
+            direction.fall(kept)
 
     def _follow_orders(self, elapsed_s: float, now_s: float) -> None:
-        for way in self._ways:
-            way.look(now_s)
-        forward, backward, left, right = self._ways
+        for direction in self._directions:
+            direction.update_orders(now_s)
+        forward, backward, left, right = self._directions
         falls = forward.excess or backward.excess or left.excess or right.excess
         if falls or forward.growth or backward.growth:
             linear_s, angular_s = self._falling_s()
@@ -220,21 +222,21 @@ class Envelope:
         so fast, tells nothing of how fast it goes.
         """
         config = self._config
-        forward, backward, left, right = self._ways
+        forward, backward, left, right = self._directions
         linear_mps, angular_radps = max(forward.most, backward.most), max(left.most, right.most)
         scaled = linear_mps + angular_radps * config.track_m / 2.0 > config.max_wheel_mps
         unknown = scaled or angular_radps >= config.angular_radps
         kept = _kept(elapsed_s, angular_s + angular_radps / config.angular_acceleration_radps2)
-        for way, opposite in ((forward, backward), (backward, forward)):
+        for direction, opposite in ((forward, backward), (backward, forward)):
             if unknown or opposite.level > 0.0:
-                way.grown = 0.0
+                direction.grown = 0.0
             else:
-                way.grow(kept)
+                direction.grow(kept)
 
     def _falling_s(self) -> tuple[float, float]:
         """How long the linear and the angular bounds still take to fall to what is ordered (rule 3)."""
         config = self._config
-        forward, backward, left, right = self._ways
+        forward, backward, left, right = self._directions
         braking, turning = config.deceleration_mps2, config.angular_deceleration_radps2
         reversing = min(config.angular_acceleration_radps2, turning)
         linear_s = max(forward.excess, backward.excess) / braking

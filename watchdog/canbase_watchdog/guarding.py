@@ -37,7 +37,7 @@ class GuardAnswers:
         """The first answer counts, whatever its toggle bit: it may have answered a watchdog before this one."""
         self._toggle: int | None = None
 
-    def take(self, data: bytes) -> bytes | None:
+    def take_answer(self, data: bytes) -> bytes | None:
         """The heartbeat that the answer stands for; None: it counts as not received."""
         answer = frames.decode_guard_answer(data)
         if answer is None:

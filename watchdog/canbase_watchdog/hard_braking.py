@@ -33,7 +33,7 @@ class HardBraking:
         if self._flagged:
             self.since = min(self.since, now_s)
 
-    def look(self, axes: Sequence[Axis]) -> None:
+    def end_at_zero_setpoints(self, axes: Sequence[Axis]) -> None:
         """It ends once the last lease is without the flag and every setpoint is zero."""
         if self.holds and not self._flagged and all(axis.target_mps == axis.setpoint_mps == 0.0 for axis in axes):
             self.since = math.inf

@@ -79,7 +79,7 @@ class TripWatch:
         self.open: Trip | None = None
         """The trip of this life whose file is not due yet."""
 
-    def look(self, watchdog: Watchdog, now_s: float) -> Trip | None:
+    def due_trip(self, watchdog: Watchdog, now_s: float) -> Trip | None:
         """After each tick: the trip whose file is due now."""
         if watchdog.verdict is not self._verdict:
             self._on_verdict(watchdog.verdict, now_s)
@@ -119,8 +119,8 @@ def head(config: WatchdogConfig, past: Past | None, trip: Trip, wall_offset_s: f
 def lines(first: dict[str, Any], inputs: Iterable[Input]) -> Iterator[str]:
     """The file, line by line: one JSON object, then one JSON array for each input."""
     yield json.dumps(first) + "\n"
-    for each in inputs:
-        yield json.dumps([_plain(value) for value in each]) + "\n"
+    for values in inputs:
+        yield json.dumps([_plain(value) for value in values]) + "\n"
 
 
 def _plain(value: Any) -> Any:

@@ -86,7 +86,7 @@ class Braking:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class NodeFeedback:
     """The feedback of one node. `seen_at`: when the oldest of its values came (monotonic, s).
 
     `begin_mps`: the speed from which it may begin to brake, which its last setpoint may have raised within the lag.
@@ -107,7 +107,7 @@ class Look:
 
 
 @dataclass(frozen=True, slots=True)
-class Climb:
+class LadderPosition:
     """Where on the ladder one node is. `since` [s] and `begin_mps`: when and how fast it came onto this rung."""
 
     step: Step
@@ -119,9 +119,9 @@ class Climb:
     """Stopped without evidence: its power is off for longer than a wheel rolls."""
     runaway: bool = False
     """It was seen not to brake: the relay opens."""
-    against: int = 0
+    too_fast_samples: int = 0
     """Samples in a row that were faster than braking allows."""
-    judged_at: float = -math.inf
+    sampled_at: float = -math.inf
     off_since: float = math.inf
     """Since when its feedback shows that it has no power; infinity: it does not."""
 
@@ -131,12 +131,12 @@ class Climb:
         return self.runaway or self.step is Step.RESET_NODE
 
 
-def first(look: Look, now_s: float) -> Climb:
+def first(feedback: NodeFeedback, now_s: float) -> LadderPosition:
     """The foot of the ladder."""
-    return Climb(Step.QUICK_STOP, now_s, look.begin_mps)
+    return LadderPosition(Step.QUICK_STOP, now_s, feedback.begin_mps)
 
 
-def advance(before: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
+def advance(before: LadderPosition, feedback: NodeFeedback, braking: Braking, now_s: float) -> LadderPosition:
     """The place of a node after this look at it. Rules, the first that fits:
 
     1. stopped, and enabled again: next rung, somebody works against us; but no reset before the power was ordered off;
@@ -153,67 +153,69 @@ def advance(before: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
        seen to have power on the rung before: one that sends nothing may be off, and a reset makes it forget 1016h;
     8. stays. A wheel that rolls without power is waited for: no rung can brake it.
     """
-    climb = _judged(before, look, braking, now_s)
-    if climb.stopped:
-        return _stopped(climb, look, now_s)
-    if look.standing and look.seen_at > climb.since and _holds(climb, look, braking, now_s):
-        return replace(climb, stopped=True, stopped_at=now_s, assumed=not look.trusted)
-    if not look.present:
-        return climb
-    if not look.trusted and climb.step < Step.DISABLE_VOLTAGE:
-        return _to(Step.DISABLE_VOLTAGE, climb, look, now_s)
-    if climb.against >= braking.samples or look.unslowed:
-        return replace(_to(max(climb.step + 1, Step.DISABLE_VOLTAGE), climb, look, now_s), runaway=True)
-    return _up(climb, look, now_s) if _disobeys(climb, look, now_s) else climb
+    position = _judged(before, feedback, braking, now_s)
+    if position.stopped:
+        return _stopped(position, feedback, now_s)
+    if feedback.standing and feedback.seen_at > position.since and _holds(position, feedback, braking, now_s):
+        return replace(position, stopped=True, stopped_at=now_s, assumed=not feedback.trusted)
+    if not feedback.present:
+        return position
+    if not feedback.trusted and position.step < Step.DISABLE_VOLTAGE:
+        return _to(Step.DISABLE_VOLTAGE, position, feedback, now_s)
+    if position.too_fast_samples >= braking.samples or feedback.unslowed:
+        return replace(_to(max(position.step + 1, Step.DISABLE_VOLTAGE), position, feedback, now_s), runaway=True)
+    return _up(position, feedback, now_s) if _disobeys(position, feedback, now_s) else position
 
 
-def _stopped(climb: Climb, look: Look, now_s: float) -> Climb:
-    if look.enabled:
-        return _to(min(climb.step + 1, Step.HEARTBEAT_WITHHELD), climb, look, now_s)
-    if not look.standing or not (look.trusted or climb.assumed):
-        step = min(climb.step, Step.HEARTBEAT_WITHHELD)
-        return replace(first(look, now_s), step=step, runaway=climb.runaway, off_since=climb.off_since)
-    if not look.powered or now_s < climb.stopped_at + HELD_S:
-        return climb
-    return _to(min(max(climb.step + 1, Step.DISABLE_VOLTAGE), Step.HEARTBEAT_WITHHELD), climb, look, now_s)
+def _stopped(position: LadderPosition, feedback: NodeFeedback, now_s: float) -> LadderPosition:
+    if feedback.enabled:
+        return _to(min(position.step + 1, Step.HEARTBEAT_WITHHELD), position, feedback, now_s)
+    if not feedback.standing or not (feedback.trusted or position.assumed):
+        step = min(position.step, Step.HEARTBEAT_WITHHELD)
+        return replace(first(feedback, now_s), step=step, runaway=position.runaway, off_since=position.off_since)
+    if not feedback.powered or now_s < position.stopped_at + HELD_S:
+        return position
+    return _to(min(max(position.step + 1, Step.DISABLE_VOLTAGE), Step.HEARTBEAT_WITHHELD), position, feedback, now_s)
 
 
-def _judged(climb: Climb, look: Look, braking: Braking, now_s: float) -> Climb:
+def _judged(position: LadderPosition, feedback: NodeFeedback, braking: Braking, now_s: float) -> LadderPosition:
     """Count this look's sample, if it is a new one that came on this rung, and note since when the power is off."""
-    if look.seen_at <= max(climb.since, climb.judged_at):
-        return climb
-    too_fast = look.speed_mps > max(0.0, braking.allowed_mps(climb.begin_mps, look.seen_at - climb.since))
-    against = climb.against + 1 if look.powered and too_fast and not look.standing else 0
-    off_since = math.inf if look.powered else min(climb.off_since, now_s)
-    at, stopped_at, seen_at = climb.since, climb.stopped_at, look.seen_at
-    assumed, runaway = climb.assumed, climb.runaway
-    return Climb(
-        climb.step, at, climb.begin_mps, climb.stopped, stopped_at, assumed, runaway, against, seen_at, off_since
+    if feedback.seen_at <= max(position.since, position.sampled_at):
+        return position
+    too_fast = feedback.speed_mps > max(0.0, braking.allowed_mps(position.begin_mps, feedback.seen_at - position.since))
+    samples = position.too_fast_samples + 1 if feedback.powered and too_fast and not feedback.standing else 0
+    off_since = math.inf if feedback.powered else min(position.off_since, now_s)
+    since, stopped_at, seen_at = position.since, position.stopped_at, feedback.seen_at
+    step, begin_mps, stopped = position.step, position.begin_mps, position.stopped
+    return LadderPosition(
+        step, since, begin_mps, stopped, stopped_at, position.assumed, position.runaway, samples, seen_at, off_since
     )
 
 
-def _holds(climb: Climb, look: Look, braking: Braking, now_s: float) -> bool:
+def _holds(position: LadderPosition, feedback: NodeFeedback, braking: Braking, now_s: float) -> bool:
     """Nothing drives it, and the sign of its standstill is evidence, or needs none any more."""
-    return not look.enabled if look.trusted else now_s >= climb.off_since + braking.coasting_s
+    return not feedback.enabled if feedback.trusted else now_s >= position.off_since + braking.coasting_s
 
 
-def _disobeys(climb: Climb, look: Look, now_s: float) -> bool:
-    obey_s = max(RUNGS[climb.step].obey_s, READINGS * look.reading_s)
-    if climb.step is Step.HEARTBEAT_WITHHELD:
-        return look.powered and look.seen_at > climb.since and now_s >= climb.since + obey_s
-    if now_s >= max(climb.since, look.seen_at) + obey_s:
+def _disobeys(position: LadderPosition, feedback: NodeFeedback, now_s: float) -> bool:
+    obey_s = max(RUNGS[position.step].obey_s, READINGS * feedback.reading_s)
+    if position.step is Step.HEARTBEAT_WITHHELD:
+        return feedback.powered and feedback.seen_at > position.since and now_s >= position.since + obey_s
+    if now_s >= max(position.since, feedback.seen_at) + obey_s:
         return True
-    asked = look.powered if climb.step >= Step.DISABLE_VOLTAGE else look.enabled
-    return asked and now_s >= climb.since + obey_s
+    asked = feedback.powered if position.step >= Step.DISABLE_VOLTAGE else feedback.enabled
+    return asked and now_s >= position.since + obey_s
 
 
-def _up(climb: Climb, look: Look, now_s: float) -> Climb:
-    return _to(climb.step + 1, climb, look, now_s)
+def _up(position: LadderPosition, feedback: NodeFeedback, now_s: float) -> LadderPosition:
+    return _to(position.step + 1, position, feedback, now_s)
 
 
-def _to(step: int, climb: Climb, look: Look, now_s: float) -> Climb:
+def _to(step: int, position: LadderPosition, feedback: NodeFeedback, now_s: float) -> LadderPosition:
     """The last rung is the end: there it stays as it is. No rung gives power to a wheel that has none."""
-    if climb.step is Step.RESET_NODE and not climb.stopped:
-        return climb
-    off_since = math.inf if look.powered else climb.off_since
-    return Climb(Step(min(step, Step.RESET_NODE)), now_s, look.begin_mps, runaway=climb.runaway, off_since=off_since)
+    if position.step is Step.RESET_NODE and not position.stopped:
+        return position
+    off_since = math.inf if feedback.powered else position.off_since
+    return LadderPosition(
+        Step(min(step, Step.RESET_NODE)), now_s, feedback.begin_mps, runaway=position.runaway, off_since=off_since
+    )

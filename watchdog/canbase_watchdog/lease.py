@@ -100,13 +100,13 @@ class LeaseBook:
         self._timeout_s = timeout_s
         self._uid = uid
         self._pid: int | None = None
-        self._heard_at = -math.inf
+        self._last_lease_at = -math.inf
         self.last: Lease | None = None
         self.valid_at = -math.inf
         """Monotonic time [s] that the last lease's age counts from: its stamp or its arrival, whichever is earlier."""
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
 
-    def take(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None = None) -> Refusal | None:
+    def take_datagram(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None = None) -> Refusal | None:
         """Judge a datagram from the user `uid` (None: unknown to the system). Returns why it does not count.
 
         `pid`: the process that sent it. Leases of one process count; of another one when the first has sent nothing for
@@ -122,14 +122,14 @@ class LeaseBook:
             self._uid is not None and uid != self._uid
         ) or pid == 0:  # 0: cannot be told apart from others (pid_namespaces(7))
             return Refusal.SENDER
-        if pid != self._pid and now_s < self._heard_at + self._timeout_s:
+        if pid != self._pid and now_s < self._last_lease_at + self._timeout_s:
             return Refusal.SECOND
         lease = parse(datagram)
         if isinstance(lease, Refusal):
             return lease
         refusal = judge(lease, self.last, self._timeout_s, now_s)
         if refusal is None:
-            self._pid, self._heard_at = pid, now_s
+            self._pid, self._last_lease_at = pid, now_s
             self.last = lease
             self.valid_at = min(now_s, lease.stamp_ns * 1e-9)
         return refusal

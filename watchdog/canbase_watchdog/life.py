@@ -52,7 +52,7 @@ def live(config: WatchdogConfig, record: Path, asked: list[int], *, after_loss: 
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
         keeper = Keeper(record, config.robot, must_last=not config.is_virtual)
         started_s = time.monotonic()
-        watchdog = Watchdog(config, started_s, keeper.past, echo=config.hears_itself)
+        watchdog = Watchdog(config, started_s, keeper.past, loopback=config.hears_itself)
         if after_loss and watchdog.status.state is State.TRIPPED:
             _quick_stop(watchdog, bus)
         inputs = InputRing(config.recording_s, started_s)

@@ -60,10 +60,10 @@ def never_wait(environment: Mapping[str, str], descriptor: int = STDERR) -> None
     the one to the journal, which is this process's own, is changed. Files stay as they are.
     """
     with contextlib.suppress(OSError):  # a closed descriptor; a terminal of another user
-        found = os.fstat(descriptor)
-        if stat.S_ISSOCK(found.st_mode) and _is_journal(environment, found):
+        status = os.fstat(descriptor)
+        if stat.S_ISSOCK(status.st_mode) and _is_journal(environment, status):
             os.set_blocking(descriptor, False)
-        if stat.S_ISFIFO(found.st_mode) or os.isatty(descriptor):
+        if stat.S_ISFIFO(status.st_mode) or os.isatty(descriptor):
             own = os.open(f"/proc/self/fd/{descriptor}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
             os.dup2(own, descriptor)
             os.close(own)

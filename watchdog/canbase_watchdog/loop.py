@@ -106,7 +106,7 @@ class Loop:
         stops = self._take_leases(now_s)
         expiry = self._watchdog.next_expiry(now_s)
         self._take_frames(now_s, min(expiry, now_s + TICK_S))
-        if stops or self._watchdog.owes_the_flag or (now_s >= wake and time.monotonic() < expiry):
+        if stops or self._watchdog.has_unreported_flag or (now_s >= wake and time.monotonic() < expiry):
             self._acted_at = now_s
             self._act(now_s)
             self._due = max(self._due, now_s - TICK_S) + TICK_S if now_s >= self._due else self._due
@@ -151,7 +151,7 @@ class Loop:
             self._relay.toggle()
         self._keep_record()
         if self._recorder is not None:
-            self._recorder.look(self._watchdog, now_s)
+            self._recorder.record_due_trip(self._watchdog, now_s)
         self._check_bus(now_s)
         self._check_requests()
         self._reporter.tick(health, now_s, self._bus.datagrams_dropped)
@@ -178,11 +178,11 @@ class Loop:
     def _check_bus(self, now_s: float) -> None:
         if self._bus.health.takes_frames:
             self._sent_at = now_s
-            self._tell_found()
+            self._log_bus_recovered()
         elif now_s >= self._sent_at + BUS_DEAD_S:
             raise BusDeadError(f"no frame could be sent for {BUS_DEAD_S:.1f} s. Is the interface up, the cable in?")
 
-    def _tell_found(self) -> None:
+    def _log_bus_recovered(self) -> None:
         if self._lost and self._bus.health.works:
             self._lost = False
             _log.info("the bus takes frames again")

@@ -69,15 +69,15 @@ def _serve(config: WatchdogConfig) -> int:
     uid = os.getuid() if config.lease_uid is None else config.lease_uid
     config = dataclasses.replace(config, lease_uid=uid)
     with ExitStack() as stack:
-        stack.enter_context(sole.take(config.bus_arguments))
+        stack.enter_context(sole.hold_bus(config.bus_arguments))
         record = latch_file.path_of(os.environ, Path.home(), config.robot)
-        stack.enter_context(sole.take_record(record))
-        _lives(config, record, asked)
+        stack.enter_context(sole.hold_record(record))
+        _live_until_signal(config, record, asked)
     _log.info("ended by %s", signal.Signals(asked[0]).name)
     return 0
 
 
-def _lives(config: WatchdogConfig, record: Path, asked: list[int]) -> None:
+def _live_until_signal(config: WatchdogConfig, record: Path, asked: list[int]) -> None:
     """One after the other, until a signal is in `asked`. Another watchdog on the bus is an error at the start alone:
     what was cut off may have got another one meanwhile, and takes its place again when that one has ended."""
     problem = ""

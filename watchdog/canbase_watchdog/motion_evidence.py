@@ -7,7 +7,7 @@ that is being stopped can lose its sensor as well (docs/decisions/0041)
    and forgets nothing, so short orders add up too, and most of it outlives the power. The time adds up while an order
    is older than `drive_lag_s`, once it ordered the travel that a sign of life takes: a slow wheel needs its time for
    that. Once enough travel was ordered it adds up without such an order too: a wheel runs away after its order; but
-   not while nothing is ordered of any wheel and none moves: then its drive has to release it, which torque.py watches.
+   not while nothing is ordered of any wheel and none moves: then its drive has to release it (torque_evidence.py).
    But a wheel that was held, and comes free as its order goes through zero, has nothing to show until the new order
    ordered it: the loop's integral has to turn round, against its friction. So each direction counts apart, and
    orders to and fro have BOTH_WAYS times the travel in all; the first turn has no time until it ordered motion.
@@ -53,7 +53,7 @@ BOTH_WAYS = 2.0
 """Of what one direction may lack."""
 ROLLING_SHARE = 0.5
 """An encoder that moved by more than this share of the travel by velocity: the wheel really rolled."""
-JOLT_MEMORY_S = 1.0
+VELOCITY_JUMP_MEMORY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +70,9 @@ class Evidence:
     """Of both directions, the time since they ordered as much as one may lack."""
     unseen: bool = False
     """Time and travel are beyond what is allowed, of one direction or of both: rule 1."""
-    halted: int = 0
+    halted_samples: int = 0
     """Samples in a row without any motion after a drop that no wheel can do: rule 2."""
-    jolts: int = 0
+    velocity_jumps: int = 0
     """Changes of the velocity that no wheel can do, none more than JOLT_MEMORY_S after the one before: rule 3."""
     ghost: Ghost = NO_GHOST
     """Rule 4."""
@@ -105,7 +105,7 @@ class EvidenceWatch:
         and when that was. Nearer is than ever, or clearly than after something had held it."""
         self._rolled = self._rests = False
         self._turns = 0
-        self._jolted_at = -math.inf
+        self._jumped_at = -math.inf
         self.last = Evidence()
 
     def on_sync(self, rests: bool) -> None:
@@ -142,21 +142,21 @@ class EvidenceWatch:
 
         `torque`: 6077h as a share of the rated torque, None: the drive does not report it.
         """
-        jolted, rolled = self._is_jolt(velocity_mps, elapsed_s), self._rolled
-        lives = self._lives(step_m, jolted)
+        jumped, rolled = self._is_velocity_jump(velocity_mps, elapsed_s), self._rolled
+        moves = self._encoder_moves(step_m, jumped)
         self._velocity_mps = velocity_mps
         self._rolled = step_m is not None and abs(step_m) > ROLLING_SHARE * abs(velocity_mps) * elapsed_s
-        self._ask(elapsed_s, now_s, enabled)
+        self._update_ordered(elapsed_s, now_s, enabled)
         ghost = self._ghost.on_sample(velocity_mps, step_m, powered, elapsed_s, now_s)
         strained_s = self._strained_s(velocity_mps, torque if powered and enabled else None, elapsed_s, now_s)
         if not powered:
-            self.last = self._kept(lives, ghost)
+            self.last = self._kept(moves, ghost)
             return
-        before = self._unseen(lives, step_m is not None, elapsed_s, torque) if enabled else self._kept(lives, ghost)
-        halted, jolts = self._halted(jolted and rolled, lives), self._jolts(jolted, now_s)
+        before = self._unseen(moves, step_m is not None, elapsed_s, torque) if enabled else self._kept(moves, ghost)
+        halted, jumps = self._halted(jumped and rolled, moves), self._velocity_jumps(jumped, now_s)
         samples, unseen = self._config.feedback_samples, self._is_unseen(before)
         strained = strained_s >= self._config.motion_missing_s
-        lies = unseen or ghost.is_one or strained or halted >= samples or jolts >= self._config.jolts
+        lies = unseen or ghost.is_one or strained or halted >= samples or jumps >= self._config.jolts
         self.last = Evidence(
             self._ordered_mps,
             self._setpoint_mps,
@@ -166,7 +166,7 @@ class EvidenceWatch:
             before.both_m,
             unseen,
             halted,
-            jolts,
+            jumps,
             ghost,
             self._behind_s(velocity_mps, elapsed_s) if enabled else 0.0,
             strained_s,
@@ -177,22 +177,22 @@ class EvidenceWatch:
         """Slower than `standstill_mps` nothing has to be seen in time: many drives cannot turn so slowly."""
         return abs(ordered_mps) > self._config.standstill_mps
 
-    def _is_jolt(self, velocity_mps: float, elapsed_s: float) -> bool:
+    def _is_velocity_jump(self, velocity_mps: float, elapsed_s: float) -> bool:
         """Samples that were received at once are one cycle apart all the same."""
         possible_mps = self._config.jolt_mps2 * max(elapsed_s, self._period_s) + self._slack_mps
         return abs(velocity_mps - self._velocity_mps) > possible_mps
 
-    def _lives(self, step_m: float | None, jolted: bool) -> bool:
-        """The encoder has moved since it last did. What it did until a jolt was before it."""
-        lives = self._life.on_step(step_m or 0.0)
-        if jolted:
+    def _encoder_moves(self, step_m: float | None, jumped: bool) -> bool:
+        """The encoder has moved since it last did. What it did until a velocity jump was before it."""
+        encoder_moves = self._life.on_step(step_m or 0.0)
+        if jumped:
             self._life.begin()
-        return lives
+        return encoder_moves
 
-    def _unseen(self, lives: bool, known: bool, elapsed_s: float, torque: float | None) -> Evidence:
+    def _unseen(self, encoder_moves: bool, known: bool, elapsed_s: float, torque: float | None) -> Evidence:
         """What rule 1 counts."""
         last, trusted = self.last, self.last.trusted
-        if lives:
+        if encoder_moves:
             self._direction, self._turns = 0.0, 0
             return Evidence(trusted=trusted)
         if not known:
@@ -235,32 +235,32 @@ class EvidenceWatch:
             return LEAST_WEIGHT if begins else 1.0
         return 1.0 if abs(torque) > STRAIN_SHARE else max(abs(torque), LEAST_WEIGHT)
 
-    def _kept(self, lives: bool, ghost: Ghost) -> Evidence:
+    def _kept(self, encoder_moves: bool, ghost: Ghost) -> Evidence:
         """What outlives a time without power: most of it, or a drive that releases after each order is never found."""
-        last = Evidence(trusted=self.last.trusted) if lives else self.last
+        last = Evidence(trusted=self.last.trusted) if encoder_moves else self.last
         return Evidence(
             unseen_m=min(last.both_m, KEPT_SHARE * self._unseen_m),
             both_s=min(last.both_s, KEPT_SHARE * self._config.motion_missing_s),
             both_m=min(last.both_m, BOTH_WAYS * self._unseen_m),
-            jolts=self.last.jolts,
+            velocity_jumps=self.last.velocity_jumps,
             ghost=replace(ghost, is_one=False),
             trusted=last.trusted,
         )
 
-    def _halted(self, halts: bool, lives: bool) -> int:
+    def _halted(self, halts: bool, encoder_moves: bool) -> int:
         if self._is_visible(self._velocity_mps):
             return 0
         if halts:
             return 1
-        return self.last.halted + 1 if self.last.halted and not lives else 0
+        return self.last.halted_samples + 1 if self.last.halted_samples and not encoder_moves else 0
 
-    def _jolts(self, jolted: bool, now_s: float) -> int:
-        before = self.last.jolts if now_s < self._jolted_at + JOLT_MEMORY_S else 0
-        if jolted:
-            self._jolted_at = now_s
-        return before + jolted
+    def _velocity_jumps(self, jumped: bool, now_s: float) -> int:
+        before = self.last.velocity_jumps if now_s < self._jumped_at + VELOCITY_JUMP_MEMORY_S else 0
+        if jumped:
+            self._jumped_at = now_s
+        return before + jumped
 
-    def _ask(self, elapsed_s: float, now_s: float, enabled: bool) -> None:
+    def _update_ordered(self, elapsed_s: float, now_s: float, enabled: bool) -> None:
         """The least that the setpoints of the lag order, and how far the slowest ramp has got to it from standstill.
 
         A wheel that still turns the other way has not begun: how fast that ends is the upper bound's, plausibility.py.

@@ -10,14 +10,14 @@ from collections.abc import Callable
 
 from canbase_config.watchdog import WatchdogConfig, WatchedDrive
 from canbase_watchdog import frames
+from canbase_watchdog.bad_cycles import BadCycles
 from canbase_watchdog.copies import Copies
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.guarding import GuardAnswers
 from canbase_watchdog.plausibility import Plausibility
 from canbase_watchdog.second_master import Foreign, guard_pace
-from canbase_watchdog.standing import StandWatch
-from canbase_watchdog.tally import Tally
-from canbase_watchdog.torque import PushWatch
+from canbase_watchdog.standstill import StandstillWatch
+from canbase_watchdog.torque_evidence import TorqueWatch
 from canbase_watchdog.view import NEVER, Axis, BusView, Node
 
 ENABLED = DriveState.OPERATION_ENABLED
@@ -43,7 +43,6 @@ class _Record:
         "feedback",
         "fresh",
         "misses",
-        "push",
         "setpoint_at",
         "setpoint_mps",
         "stand",
@@ -51,6 +50,7 @@ class _Record:
         "status_at",
         "statuses",
         "target_mps",
+        "torque",
         "velocity_at",
         "velocity_mps",
     )
@@ -58,7 +58,7 @@ class _Record:
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig, now_s: float) -> None:
         self.drive = drive
         self.feedback = Plausibility(drive, config, now_s)
-        self.push, self.stand = PushWatch(drive, config), StandWatch(drive, config)
+        self.torque, self.stand = TorqueWatch(drive, config), StandstillWatch(drive, config)
         self.state: DriveState | None = None
         self.status_at = self.enabled_since = self.disabled_since = NEVER
         self.velocity_mps, self.velocity_at = 0.0, NEVER
@@ -66,7 +66,7 @@ class _Record:
         self.target_mps, self.command_at = 0.0, NEVER
         self.setpoint_mps, self.setpoint_at = 0.0, NEVER
         self.asks_for_power = self.fresh = False
-        self.misses, self.doubles, self.double_statuses = Tally(), Tally(), Tally()
+        self.misses, self.doubles, self.double_statuses = BadCycles(), BadCycles(), BadCycles()
         self.answers = self.statuses = 0
         self.copies = Copies()
 
@@ -91,7 +91,7 @@ class _Record:
             self.stand.position_at,
             self.misses.value,
             max(self.doubles.value, self.double_statuses.value),
-            self.push.last,
+            self.torque.last,
             self.stand.sudden,
             self.stand.unproven,
             self.copies.at,
@@ -125,22 +125,22 @@ class _Record:
 class Observer:
     """Keeps the last values of everything on the bus that concerns the configured drives."""
 
-    def __init__(self, config: WatchdogConfig, now_s: float, *, echo: bool = True) -> None:
-        """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis. `echo`:
-        what this watchdog sends comes back to it."""
+    def __init__(self, config: WatchdogConfig, now_s: float, *, loopback: bool = True) -> None:
+        """Listens for the drives in `config`; the lower axis number of a node uses the PDOs of its first axis.
+        `loopback`: what this watchdog sends comes back to it."""
         self._hard = False
         self._gap_s = config.feedback_timeout_s
         self._still_mps = config.motion_tolerance_mps
         self._records = {(drive.node_id, drive.axis): _Record(drive, config, now_s) for drive in config.drives}
         self._in_order = tuple(self._records.values())
         self._heartbeat_at = {node_id: NEVER for node_id, _ in self._records}
-        self._heard_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
+        self._last_frame_at, self._boot_up_at = dict(self._heartbeat_at), dict(self._heartbeat_at)
         self._configured_at = dict(self._heartbeat_at)
         self._operational = dict.fromkeys(self._heartbeat_at, False)
         self._answers = {drive.node_id: GuardAnswers() for drive in config.drives if drive.guarded}
         self._guards = {node_id: guard_pace(config) for node_id in self._answers}
         self._guard_period_s = config.guard_period_s
-        self._foreign = Foreign(config, echo=echo)
+        self._foreign = Foreign(config, loopback=loopback)
         self._driver_at = self._sync_at = self._sync_since = NEVER
         self._routes: dict[int, Callable[[bytes, float], bool]] = {}
         self._view: BusView | None = None
@@ -160,13 +160,13 @@ class Observer:
         if not route(data, now_s):
             self.dropped += 1
 
-    def look(self) -> BusView:
+    def bus_view(self) -> BusView:
         """Everything as it stands; the same object as long as nothing has come."""
         if self._view is None:
-            self._view = self._put_together()
+            self._view = self._build_view()
         return self._view
 
-    def _put_together(self) -> BusView:
+    def _build_view(self) -> BusView:
         return BusView(
             tuple([record.axis() for record in self._in_order]),
             tuple([self._node(node_id) for node_id in self._heartbeat_at]),
@@ -177,9 +177,9 @@ class Observer:
         )
 
     def _node(self, node_id: int) -> Node:
-        heartbeat_at, heard_at = self._heartbeat_at[node_id], self._heard_at[node_id]
+        heartbeat_at, last_frame_at = self._heartbeat_at[node_id], self._last_frame_at[node_id]
         boot_up_at, configured_at = self._boot_up_at[node_id], self._configured_at[node_id]
-        return Node(node_id, heartbeat_at, heard_at, boot_up_at, configured_at, self._operational[node_id])
+        return Node(node_id, heartbeat_at, last_frame_at, boot_up_at, configured_at, self._operational[node_id])
 
     def brake(self, hard: bool) -> None:
         """Whether from now on each wheel has to follow setpoints that fall with the emergency deceleration."""
@@ -194,7 +194,7 @@ class Observer:
         self._view = None
         for record in self._records.values():
             record.feedback.trust()
-            record.push.trust()
+            record.torque.trust()
             record.stand.trust()
 
     @property
@@ -208,15 +208,15 @@ class Observer:
         self._routes[frames.DRIVER_HEARTBEAT] = self._on_driver_heartbeat
         self._routes[frames.WATCHDOG_HEARTBEAT] = self._on_watchdog_heartbeat
         self._routes[frames.LSS_REQUEST] = self._on_lss
-        for node_id in self._heard_at:
+        for node_id in self._last_frame_at:
             self._add_node_routes(node_id)
             for place, key in enumerate(sorted(key for key in self._records if key[0] == node_id)):
                 self._add_axis_routes(place, key)
 
     def _add_node_routes(self, node_id: int) -> None:
         routes = self._routes
-        beats = self._on_guard_answer if node_id in self._answers else self._on_heartbeat
-        routes[frames.HEARTBEAT + node_id] = lambda data, now_s: beats(node_id, data, now_s)
+        on_answer = self._on_guard_answer if node_id in self._answers else self._on_heartbeat
+        routes[frames.HEARTBEAT + node_id] = lambda data, now_s: on_answer(node_id, data, now_s)
         routes[frames.SDO_ANSWER + node_id] = lambda data, now_s: self._on_sdo_answer(node_id, data, now_s)
         routes[frames.SDO_REQUEST + node_id] = lambda data, now_s: self._on_sdo_request(node_id, data, now_s)
         routes[frames.QUICK_STOP_RPDO + node_id] = lambda data, now_s: self._on_quick_stop(node_id, data, now_s)
@@ -237,7 +237,7 @@ class Observer:
             record.on_sync(now_s)
             rests = rests and record.rests(self._still_mps)
         for record in self._in_order:
-            record.push.on_sync(record.setpoint_mps, rests)
+            record.torque.on_sync(record.setpoint_mps, rests)
             record.feedback.evidence.on_sync(rests)
         if now_s >= self._sync_at + self._gap_s:
             self._sync_since = now_s
@@ -258,14 +258,14 @@ class Observer:
     def _on_heartbeat(self, node_id: int, data: bytes, now_s: float) -> bool:
         if len(data) != 1:
             return False
-        self._heartbeat_at[node_id] = self._heard_at[node_id] = now_s
+        self._heartbeat_at[node_id] = self._last_frame_at[node_id] = now_s
         self._operational[node_id] = data[0] == frames.OPERATIONAL
         if data == frames.BOOT_UP and self._is_enabled(node_id, now_s):
             self._boot_up_at[node_id] = now_s
         return True
 
     def _on_guard_answer(self, node_id: int, data: bytes, now_s: float) -> bool:
-        state = self._answers[node_id].take(data)
+        state = self._answers[node_id].take_answer(data)
         if data != frames.BOOT_UP and self._guards[node_id].too_fast(now_s):
             period_s = self._guard_period_s
             often = f"more answers to node guarding than one each {period_s:.3f} s (heartbeats, 1017h, count too)"
@@ -283,13 +283,13 @@ class Observer:
             return False
         record.fed_status_at = now_s
         record.statuses += 1
-        record.copies.take(data, now_s)
+        record.copies.note_frame(data, now_s)
         record.feedback.on_position(status[1])
-        record.push.on_position(status[1])
+        record.torque.on_position(status[1])
         record.stand.on_position(status[1], now_s)
         bits = frames.decode_joined_velocity(data, record.drive.layout)
         if bits is not None:
-            self._take_velocity(record, bits, None, now_s)
+            self._note_tpdo_velocity(record, bits, None, now_s)
         return True
 
     def _note_state(self, record: _Record, statusword: int, now_s: float) -> bool:
@@ -301,31 +301,31 @@ class Observer:
         elif state is not ENABLED and record.state is ENABLED:
             record.disabled_since = now_s
         record.state, record.status_at = state, now_s
-        self._heard_at[record.drive.node_id] = now_s
+        self._last_frame_at[record.drive.node_id] = now_s
         return True
 
     def _on_velocity(self, record: _Record, data: bytes, now_s: float) -> bool:
         bits = frames.decode_velocity(data, record.drive.layout)
         if bits is None:
             return False
-        self._take_velocity(record, bits, frames.decode_torque(data, record.drive.layout), now_s)
+        self._note_tpdo_velocity(record, bits, frames.decode_torque(data, record.drive.layout), now_s)
         return True
 
-    def _take_velocity(self, record: _Record, bits: int, torque: float | None, now_s: float) -> None:
+    def _note_tpdo_velocity(self, record: _Record, bits: int, torque: float | None, now_s: float) -> None:
         """Out of a TPDO, behind the position of the same SYNC."""
         self._note_velocity(record, bits, now_s)
         record.fed_velocity_at = now_s
         record.answers += 1
         enabled, powered = record.state is ENABLED, frames.is_powered(record.state)
-        record.push.on_sample(torque, powered, now_s)
-        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now_s, record.push.last.share)
-        if record.push.lies:
+        record.torque.on_sample(torque, powered, now_s)
+        record.feedback.on_velocity(record.velocity_mps, powered, enabled, now_s, record.torque.last.share)
+        if record.torque.contradicts_encoder:
             record.feedback.evidence.doubt()
 
     def _note_velocity(self, record: _Record, bits: int, now_s: float) -> None:
         record.velocity_mps, record.velocity_at = bits * record.drive.velocity_mps_per_bit, now_s
         record.stand.on_velocity(record.velocity_mps, now_s, frames.is_powered(record.state))
-        self._heard_at[record.drive.node_id] = now_s
+        self._last_frame_at[record.drive.node_id] = now_s
 
     def _on_setpoint(self, record: _Record, cob_id: int, data: bytes, now_s: float) -> bool:
         setpoint = frames.decode_setpoint(data, record.drive.layout)
@@ -340,7 +340,7 @@ class Observer:
 
     def _on_sdo_answer(self, node_id: int, data: bytes, now_s: float) -> bool:
         """Answers to anybody's reading of 6041h, 6064h and 606Ch are as true as a TPDO; all others are not for us."""
-        self._heard_at[node_id] = now_s
+        self._last_frame_at[node_id] = now_s
         answer = frames.decode_sdo(data)
         understood = True
         for key, record in self._records.items():
@@ -362,13 +362,13 @@ class Observer:
         command = frames.decode_nmt(data)
         if command is None:
             return False
-        for node_id in self._heard_at:
+        for node_id in self._last_frame_at:
             if command[1] in (0, node_id):
                 self._note_foreign(node_id, f"NMT command {command[0]} for node {command[1]}", now_s)
         return True
 
     def _on_lss(self, data: bytes, now_s: float) -> bool:
-        for node_id in self._heard_at:
+        for node_id in self._last_frame_at:
             self._note_foreign(node_id, f"an LSS request {data.hex(' ')} (CiA 305: node ids, bit rate)", now_s)
         return True
 

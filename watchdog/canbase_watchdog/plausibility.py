@@ -38,11 +38,11 @@ class Feedback:
 
     low_mps: float = 0.0
     high_mps: float = 0.0
-    outside: int = 0
+    outside_samples: int = 0
     """Samples in a row outside the range and its tolerance."""
-    overspeed: int = 0
+    overspeed_samples: int = 0
     """Samples in a row above the greatest speed of any wheel."""
-    implausible: int = 0
+    implausible_samples: int = 0
     """Samples in a row at which encoder and velocity had drifted apart, or the encoder jumped."""
     drift_m: float = 0.0
     """Travel by velocity minus travel by encoder."""
@@ -111,7 +111,7 @@ class Plausibility:
         self._judge(velocity_mps, powered, drift_m, jumped, elapsed_s, now_s)
         step_m = None if jumped else step_m
         self.evidence.on_sample(velocity_mps, step_m, powered, enabled, elapsed_s, now_s, torque)
-        if self.last.implausible >= self._config.feedback_samples:
+        if self.last.implausible_samples >= self._config.feedback_samples:
             self.evidence.doubt()
         self._velocity_mps, self._counts_before = velocity_mps, self._counts
 
@@ -131,9 +131,9 @@ class Plausibility:
         self.last = Feedback(
             -self._low,
             self._high,
-            0 if inside else last.outside + 1,
-            last.overspeed + 1 if abs(velocity_mps) > self._fastest_mps else 0,
-            last.implausible + (elapsed_s >= self._bunched_s) if apart else 0,
+            0 if inside else last.outside_samples + 1,
+            last.overspeed_samples + 1 if abs(velocity_mps) > self._fastest_mps else 0,
+            last.implausible_samples + (elapsed_s >= self._bunched_s) if apart else 0,
             drift_m,
         )
 

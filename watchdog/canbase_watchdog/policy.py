@@ -64,7 +64,7 @@ def _unfed(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool
     return missed and now_s < view.bus.sync_at + config.feedback_timeout_s
 
 
-def _beatless(node: Node, axis: Axis, config: WatchdogConfig, now_s: float) -> bool:
+def _heartbeat_missing(node: Node, axis: Axis, config: WatchdogConfig, now_s: float) -> bool:
     return now_s >= max(node.heartbeat_at, axis.enabled_since) + config.drive_heartbeat_s
 
 
@@ -90,7 +90,7 @@ def _drive_silent(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
         if not axis.enabled:
             continue
         node = view.node(axis.drive.node_id)
-        if _unfed(axis, view, config, now_s) or _beatless(node, axis, config, now_s):
+        if _unfed(axis, view, config, now_s) or _heartbeat_missing(node, axis, config, now_s):
             detail = (
                 f"{axis.drive.joint} is enabled, its feedback is {now_s - axis.fed_at:.3f} s old (allowed "
                 f"{config.feedback_timeout_s:.3f} s), its heartbeat {now_s - node.heartbeat_at:.3f} s "
@@ -136,16 +136,19 @@ class BaseSign:
 
 
 OF_THE_SETPOINTS = (
-    BaseSign("halt", lambda view: view.halt),
-    BaseSign("creep", lambda view: f"{view.creep}, while the leases allow no motion" if view.creep else ""),
-    BaseSign("pair", lambda view: f"left and right wheels are ordered {view.skew}" if view.skew else ""),
+    BaseSign("ramp_to_zero", lambda view: view.ramp_to_zero),
+    BaseSign(
+        "setpoint_at_rest",
+        lambda view: f"{view.setpoint_at_rest}, while the leases allow no motion" if view.setpoint_at_rest else "",
+    ),
+    BaseSign("left_right", lambda view: f"left and right wheels are ordered {view.skew}" if view.skew else ""),
 )
 
 
 def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         feedback = axis.feedback
-        if axis.powered and feedback.outside >= config.feedback_samples:
+        if axis.powered and feedback.outside_samples >= config.feedback_samples:
             detail = (
                 f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, "
                 f"its setpoints allow {feedback.low_mps:.3f} to {feedback.high_mps:.3f} m/s"
@@ -156,7 +159,7 @@ def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict
 
 def _overspeed(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
-        if axis.powered and axis.feedback.overspeed >= config.feedback_samples:
+        if axis.powered and axis.feedback.overspeed_samples >= config.feedback_samples:
             limit_mps = config.overspeed_factor * config.max_wheel_mps
             detail = f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s (allowed {limit_mps:.3f} m/s)"
             return Verdict(TripCause.OVERSPEED, axis.drive.node_id, detail)
@@ -188,7 +191,7 @@ def _feedback_implausible(view: View, config: WatchdogConfig, now_s: float) -> V
 
 
 def _halted(axis: Axis, config: WatchdogConfig) -> str:
-    if axis.evidence.halted < config.feedback_samples:
+    if axis.evidence.halted_samples < config.feedback_samples:
         return ""
     return (
         f"reports standstill at once, and no motion since, with {axis.evidence.setpoint_mps:.3f} m/s ordered: "
@@ -196,12 +199,12 @@ def _halted(axis: Axis, config: WatchdogConfig) -> str:
     )
 
 
-def _jolts(axis: Axis, config: WatchdogConfig) -> str:
-    if axis.evidence.jolts < config.jolts:
+def _velocity_jumps(axis: Axis, config: WatchdogConfig) -> str:
+    if axis.evidence.velocity_jumps < config.jolts:
         return ""
     return (
-        f"reports {axis.velocity_mps:.3f} m/s, and {axis.evidence.jolts} changes of speed that no wheel can do "
-        f"(watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
+        f"reports {axis.velocity_mps:.3f} m/s, and {axis.evidence.velocity_jumps} changes of speed that no wheel can "
+        f"do (watchdog.jolt_mps2 {config.jolt_mps2:g} m/s²)"
     )
 
 
@@ -216,7 +219,7 @@ def _ghost(axis: Axis, config: WatchdogConfig) -> str:
 
 
 def _drift(axis: Axis, config: WatchdogConfig) -> str:
-    if axis.feedback.implausible < config.feedback_samples:
+    if axis.feedback.implausible_samples < config.feedback_samples:
         return ""
     return (
         f"reports {axis.velocity_mps:.3f} m/s, and its encoder contradicts it: "
@@ -226,7 +229,7 @@ def _drift(axis: Axis, config: WatchdogConfig) -> str:
 
 IMPLAUSIBLE = (
     WheelSign("halted", _halted),
-    WheelSign("jolts", _jolts),
+    WheelSign("velocity_jumps", _velocity_jumps),
     WheelSign("ghost", _ghost),
     WheelSign("drift", _drift),
 )
@@ -255,10 +258,10 @@ def _unseen(axis: Axis, config: WatchdogConfig) -> str:
 
 
 def _vain(axis: Axis, config: WatchdogConfig) -> str:
-    if axis.push.vain_s < config.motion_missing_s:
+    if axis.torque.vain_s < config.motion_missing_s:
         return ""
     return (
-        f"is pushed with {_torque(axis)} and shows no motion for {axis.push.vain_s:.3f} s (allowed "
+        f"is pushed with {_torque(axis)} and shows no motion for {axis.torque.vain_s:.3f} s (allowed "
         f"{config.motion_missing_s:.3f} s), ordered {axis.evidence.setpoint_mps:.3f} m/s: see encoder, motor, wheel"
     )
 
@@ -294,16 +297,16 @@ MISSING = (
 
 
 def _torque(axis: Axis) -> str:
-    share = axis.push.share
+    share = axis.torque.share
     return "a torque that the drive does not report" if share is None else f"{share:.0%} of the rated torque"
 
 
 def _power_at_stand(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
-        if axis.powered and axis.push.overdue_s >= config.stand_answer_s:
+        if axis.powered and axis.torque.overdue_s >= config.stand_answer_s:
             detail = (
                 f"{axis.drive.joint} is ordered {axis.setpoint_mps:.3f} m/s, reports {axis.velocity_mps:.3f} m/s and "
-                f"has been held with {_torque(axis)} for {axis.push.overdue_s:.3f} s (allowed "
+                f"has been held with {_torque(axis)} for {axis.torque.overdue_s:.3f} s (allowed "
                 f"{config.stand_answer_s:.3f} s) without release of the wheel: its encoder may be dead "
                 "(watchdog.stand_proof, watchdog.stand_answer_s)"
             )
@@ -347,8 +350,8 @@ _COPIED_ANSWERS = (
 def _answered_twice(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
     for axis in view.axes:
         if axis.enabled and axis.double_answers >= _cycles(config):
-            told = _COPIED_ANSWERS if now_s - axis.copied_at <= config.feedback_timeout_s else _TWO_DRIVES
-            detail = told.format(axis.drive.node_id, axis.drive.joint)
+            template = _COPIED_ANSWERS if now_s - axis.copied_at <= config.feedback_timeout_s else _TWO_DRIVES
+            detail = template.format(axis.drive.node_id, axis.drive.joint)
             return Verdict(TripCause.ANSWERED_TWICE, axis.drive.node_id, detail)
     return FINE
 
@@ -457,7 +460,7 @@ CHECKS = (
     Check(
         TripCause.DRIVE_SILENT,
         _drive_silent,
-        lambda view, node_id, config, now_s: now_s >= view.node(node_id).heard_at + config.drive_heartbeat_s,
+        lambda view, node_id, config, now_s: now_s >= view.node(node_id).last_frame_at + config.drive_heartbeat_s,
         "the drive answers again",
     ),
     Check(

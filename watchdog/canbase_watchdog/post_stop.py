@@ -36,10 +36,10 @@ def plan(config: WatchdogConfig) -> list[list[Frame]]:
     The quick stop goes first, for it needs the PDO that pre-operational switches off; a drive keeps to its ramp after.
     """
     nodes = [drive.node_id for drive in config.drives]
-    each = list(dict.fromkeys(nodes))
+    node_ids = list(dict.fromkeys(nodes))
     layouts = {drive.node_id: drive.layout for drive in config.drives}
-    stops = [frames.quick_stop(node_id, nodes.count(node_id), layouts[node_id]) for node_id in each]
-    return [*([stops] * QUICK_STOPS), [frames.pre_operational(node_id) for node_id in each]]
+    stops = [frames.quick_stop(node_id, nodes.count(node_id), layouts[node_id]) for node_id in node_ids]
+    return [*([stops] * QUICK_STOPS), [frames.pre_operational(node_id) for node_id in node_ids]]
 
 
 def send(rounds: Sequence[Sequence[Frame]], bus: BusPort, sleep: Callable[[float], None]) -> bool:

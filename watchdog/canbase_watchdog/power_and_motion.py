@@ -14,8 +14,8 @@ def moving(axis: Axis, config: WatchdogConfig) -> bool:
 
 def commanded(axis: Axis, config: WatchdogConfig) -> bool:
     """True for a wheel that is ordered to turn: enabled, or ordered to be while it reports nothing itself."""
-    unheard = axis.asks_for_power and axis.command_at >= axis.status_at + config.feedback_timeout_s
-    return axis.target_mps != 0.0 and (axis.enabled or unheard)
+    unreported = axis.asks_for_power and axis.command_at >= axis.status_at + config.feedback_timeout_s
+    return axis.target_mps != 0.0 and (axis.enabled or unreported)
 
 
 def in_motion(view: View, config: WatchdogConfig) -> Axis | None:
@@ -35,8 +35,8 @@ def is_off(axis: Axis, view: View, config: WatchdogConfig, now_s: float) -> bool
     """Fresh feedback shows it, or there is no such drive."""
     if near_power(axis):
         return False
-    told = axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s
-    return told or view.node(axis.drive.node_id).heard_at == NEVER
+    reported = axis.state is not None and now_s < axis.status_at + config.feedback_timeout_s
+    return reported or view.node(axis.drive.node_id).last_frame_at == NEVER
 
 
 def velocity_ordered(view: View, config: WatchdogConfig, now_s: float) -> bool:

@@ -35,26 +35,26 @@ class Reporter:
     def tick(self, health: BusHealth, now_s: float, datagrams_dropped: int = 0) -> None:
         """Report what changed. systemd learns that the loop turns, also on a bus that takes no frames."""
         if self._watchdog.status != self._status:
-            self._tell_status(self._watchdog.status)
+            self._log_status(self._watchdog.status)
         if now_s >= self._alive_due:
             self._alive_due = now_s + ALIVE_PERIOD_S
             notify("WATCHDOG=1")
         if now_s >= self._counters_due:
-            self._tell_counters(health, now_s, datagrams_dropped)
+            self._log_counters(health, now_s, datagrams_dropped)
 
-    def _tell_status(self, status: Status) -> None:
+    def _log_status(self, status: Status) -> None:
         old, self._status = self._status, status
         if old is None or (old.state, old.verdict) != (status.state, status.verdict):
             text = _state_line(status)
             _log.log(logging.WARNING if status.state is State.TRIPPED else logging.INFO, text)
             notify(f"STATUS={text}")
         if status.state is State.TRIPPED and old is not None:
-            _tell_ladder(old, status)
+            _log_ladder(old, status)
         number, answer = status.reset
         if answer is not Answer.NONE and (old is None or old.reset != status.reset):
             _log.info("reset request %d: %s", number, _words(answer))
 
-    def _tell_counters(self, health: BusHealth, now_s: float, datagrams_dropped: int) -> None:
+    def _log_counters(self, health: BusHealth, now_s: float, datagrams_dropped: int) -> None:
         counters = {
             "send errors": health.send_errors,
             "receive errors": health.receive_errors,
@@ -74,7 +74,7 @@ def _words(name: enum.Enum) -> str:
     return name.name.lower().replace("_", " ")
 
 
-def _tell_ladder(old: Status, status: Status) -> None:
+def _log_ladder(old: Status, status: Status) -> None:
     if old.step is not status.step:
         _log.warning("ladder: %s", _words(status.step))
     if status.unproven and status.unproven != old.unproven:

@@ -30,7 +30,7 @@ SYNC_LOST, OFF_BEAT = 1.5, 0.75
 EXCESS = 1.5
 SYNC_WINDOW_S = 0.5
 HEARTBEAT_PERIODS = 10
-BEATS, BEAT_TIMEOUTS = 3, 2.5
+OWN_HEARTBEATS, OWN_HEARTBEAT_TIMEOUTS = 3, 2.5
 """So many heartbeats of this watchdog's node in so many times that a drive allows without one: where own frames do not
 come back, none is its own."""
 GUARD_PERIODS, GUARD_EXCESS = 60, 1.15
@@ -73,18 +73,20 @@ def guard_pace(config: WatchdogConfig) -> Pace:
 class Foreign:
     """Remembers the last sign of another master."""
 
-    def __init__(self, config: WatchdogConfig, *, echo: bool = True) -> None:
-        """Knows from `config` how often the driver sends what. `echo`: the frames of this watchdog come back to it."""
+    def __init__(self, config: WatchdogConfig, *, loopback: bool = True) -> None:
+        """Knows from `config` how often the driver sends what. `loopback`: this watchdog receives its own frames."""
         period_s = config.heartbeat_period_s
         too_many = math.ceil(EXCESS * HEARTBEAT_PERIODS) + 1, HEARTBEAT_PERIODS * period_s
-        self._beats = Pace(*too_many) if echo else Pace(BEATS, BEAT_TIMEOUTS * config.drive_heartbeat_s)
+        self._own_heartbeats = (
+            Pace(*too_many) if loopback else Pace(OWN_HEARTBEATS, OWN_HEARTBEAT_TIMEOUTS * config.drive_heartbeat_s)
+        )
         self._syncs = Pace(math.ceil(EXCESS * SYNC_WINDOW_S * config.control_hz) + 1, SYNC_WINDOW_S)
         self._heartbeats = Pace(*too_many)
         self._disorder = Pace(DISORDER_COUNT, DISORDER_S)
         self._control_hz, self._period_s = config.control_hz, period_s
         self._lost_s, self._off_beat_s = SYNC_LOST / config.control_hz, OFF_BEAT / config.control_hz
         self._sync_at = math.inf
-        self._copies = SentAgain(echo=echo)
+        self._copies = SentAgain(loopback=loopback)
         self._setpoints: dict[int, bytes] = {}
         """COB-ID and data of the setpoints since the last SYNC."""
         self.last: Sign | None = None
@@ -117,7 +119,7 @@ class Foreign:
     def on_watchdog_heartbeat(self, now_s: float) -> None:
         """A heartbeat of this watchdog's own node that was received."""
         self._copies.on_own(now_s)
-        if self._beats.too_fast(now_s):
+        if self._own_heartbeats.too_fast(now_s):
             self.note_too_many(0, NOT_OURS, now_s)
 
     def note(self, node_id: int, detail: str, now_s: float) -> None:

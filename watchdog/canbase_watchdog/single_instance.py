@@ -22,13 +22,13 @@ class TakenError(Exception):
     """Another process has it; the text names it."""
 
 
-def take(bus: dict[str, Any]) -> socket.socket:
+def hold_bus(bus: dict[str, Any]) -> socket.socket:
     """Hold the bus until the socket is closed or the process ends. Raises TakenError with the holder."""
     name = ":".join(str(bus.get(key, "")) for key in ("interface", "channel", "port"))
     return _hold("watchdog", name, f"another watchdog guards {name}", "Only one may run; end it first")
 
 
-def take_record(path: Path) -> socket.socket:
+def hold_record(path: Path) -> socket.socket:
     """Be the only one that writes this record. Raises TakenError: two robots of one name would forget each other's."""
     name = str(path.resolve())
     advice = "Two robots on one computer need two names (`name` in robot.yaml)"
@@ -55,8 +55,8 @@ def _who(address: str) -> str:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
             caller.setblocking(False)
             caller.connect(address)
-            found = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+            credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     except OSError as error:
         return f"who it is cannot be seen ({error.strerror or error})"
-    pid, uid, _ = _CREDENTIALS.unpack(found)
+    pid, uid, _ = _CREDENTIALS.unpack(credentials)
     return f"process {pid} of user {uid}"

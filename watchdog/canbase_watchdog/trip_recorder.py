@@ -60,9 +60,9 @@ class TripRecorder(threading.Thread):
         finally:
             threading.stack_size(usual)
 
-    def look(self, watchdog: Watchdog, now_s: float) -> None:
+    def record_due_trip(self, watchdog: Watchdog, now_s: float) -> None:
         """After each tick: a trip whose file is due goes to the writer. Never waits."""
-        trip = self._watch.look(watchdog, now_s)
+        trip = self._watch.due_trip(watchdog, now_s)
         if trip is not None:
             self._hand_over(trip, now_s)
 

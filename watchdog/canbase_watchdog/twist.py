@@ -83,7 +83,7 @@ class TwistWatch:
         self._speeds: list[float] = []
         self._outside_s = 0.0
 
-    def look(self, bus: BusView, now_s: float) -> str:
+    def check_motion(self, bus: BusView, now_s: float) -> str:
         """Why the base has not moved as ordered for `twist_s`, empty when it has."""
         if bus.sync_at == self._sync_at:
             return ""
@@ -121,7 +121,7 @@ class TwistWatch:
         fastest_mps = max(abs(low_mps), abs(high_mps))
         tolerance_mps = config.twist_tolerance_mps + self._coarsest_mps + config.twist_tolerance_share * fastest_mps
         lefts, rights = self._side(bus, "left"), self._side(bus, "right")
-        why = bounds.pairs(lefts, rights, config.track_m, tolerance_mps)
+        why = bounds.all_left_right(lefts, rights, config.track_m, tolerance_mps)
         return why and f"{why}; {self._worst(bus)}"
 
     def _side(self, bus: BusView, side: str) -> list[float]:

@@ -12,7 +12,7 @@ from canbase_watchdog.lease import Lease
 from canbase_watchdog.motion_evidence import Evidence
 from canbase_watchdog.plausibility import Feedback
 from canbase_watchdog.second_master import Sign
-from canbase_watchdog.torque import Push
+from canbase_watchdog.torque_evidence import TorqueEvidence
 
 NEVER = -math.inf
 """Receive time of what has not come yet."""
@@ -42,15 +42,15 @@ class Axis:
     fed_at: float = NEVER
     """When the older one of its TPDOs came: status and velocity. What somebody reads by SDO is not fed."""
     standing: bool = False
-    """Its encoder and its velocity show that the wheel is at standstill: standing.py."""
+    """Its encoder and its velocity show that the wheel is at standstill: standstill.py."""
     position_at: float = NEVER
     missed_setpoints: float = 0.0
     """SYNCs without a setpoint while it was enabled, less half of those with one."""
     double_answers: float = 0.0
     """SYNCs that were answered twice while it was enabled, less half of the others."""
-    push: Push = Push()  # noqa: RUF009 - immutable
+    torque: TorqueEvidence = TorqueEvidence()  # noqa: RUF009 - immutable
     sudden: bool = False
-    """It stopped as no wheel can, by its last values: standing.py."""
+    """It stopped as no wheel can, by its last values: standstill.py."""
     unproven: bool = False
     """The same, for some samples."""
     copied_at: float = NEVER
@@ -87,7 +87,7 @@ class Node:
 
     node_id: int
     heartbeat_at: float = NEVER
-    heard_at: float = NEVER
+    last_frame_at: float = NEVER
     boot_up_at: float = NEVER
     """When a boot-up came from it although it had just reported that it was enabled."""
     configured_at: float = NEVER
@@ -121,11 +121,11 @@ class View:
     """Why the setpoints of both sides do not go together, for two SYNCs in a row; empty when they do."""
     twist: str = ""
     """Why the base has not moved as ordered for `twist_s`; empty when it has."""
-    creep: str = ""
+    setpoint_at_rest: str = ""
     """Which wheel is ordered to turn, and for how long, while no lease allows it; empty: none."""
     tick_gap_s: float = 0.0
     bus_failed_since: float = math.inf
-    halt: str = ""
+    ramp_to_zero: str = ""
     """Which wheel's setpoint does not fall while nothing but zero is leased, for two SYNCs in a row; empty: all do."""
 
     @property

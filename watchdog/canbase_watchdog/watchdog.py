@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 
 from canbase_config.watchdog import STATE_PERIOD_S, WatchdogConfig
 from canbase_watchdog import frames, policy
-from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Envelope
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.guarding import GuardRequests
-from canbase_watchdog.halt import HaltWatch
 from canbase_watchdog.hard_braking import HardBraking
 from canbase_watchdog.ladder import Step
 from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
+from canbase_watchdog.left_right import LeftRightWatch
 from canbase_watchdog.observer import Observer
-from canbase_watchdog.pair import PairWatch
 from canbase_watchdog.power_and_motion import in_motion, is_off, near_power, velocity_ordered
+from canbase_watchdog.ramp_to_zero import RampToZeroWatch
+from canbase_watchdog.setpoint_at_rest import SetpointAtRestWatch
 from canbase_watchdog.stopper import Stopper
 from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
 from canbase_watchdog.twist import TwistWatch
@@ -74,23 +74,25 @@ class Watchdog:
     TRIPPED from the first cause on, latched: only an accepted reset request leads back to WATCHING, over restarts too.
     """
 
-    def __init__(self, config: WatchdogConfig, now_s: float, past: Past | None = None, *, echo: bool = True) -> None:
+    def __init__(
+        self, config: WatchdogConfig, now_s: float, past: Past | None = None, *, loopback: bool = True
+    ) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
 
-        `past`: the record of its last life; None: no record is kept, which is for virtual time alone. `echo`: what
+        `past`: the record of its last life; None: no record is kept, which is for virtual time alone. `loopback`: what
         it sends comes back to it.
         """
         self._config = config
-        self._observer = Observer(config, now_s, echo=echo)
+        self._observer = Observer(config, now_s, loopback=loopback)
         self._envelope = Envelope(config, now_s)
-        self._pair = PairWatch(config)
+        self._left_right = LeftRightWatch(config)
         self._twist = TwistWatch(config, now_s)
-        self._creep, self._halt = CreepWatch(config), HaltWatch(config)
+        self._setpoint_at_rest, self._ramp_to_zero = SetpointAtRestWatch(config), RampToZeroWatch(config)
         self._hard = HardBraking()
         self._leases = LeaseBook(config.lease_timeout_s, config.lease_uid)
         self._started_at = self._ticked_at = now_s
         self._bus_failed_since, self._bus_errors = math.inf, 0
-        self._view = self._look(now_s)
+        self._view = self._observe(now_s)
         self._fine: BusView | None = None
         """What the bus showed when nothing tripped."""
         self._state = State.STARTING
@@ -104,7 +106,7 @@ class Watchdog:
         self._reset_at = -math.inf
         self._heartbeat_due = self._state_due = self._counters_due = now_s
         self._guard = GuardRequests(config, now_s)
-        self._told: Status | None = None
+        self._reported_status: Status | None = None
         self._longest_gap_s = 0.0
         self._ledger = Ledger(past)
         self.trips = 0
@@ -117,17 +119,17 @@ class Watchdog:
     @property
     def status(self) -> Status:
         """State, cause and rung as of now."""
-        assumed = any(stopper.climb.assumed for stopper in self._stoppers) if self._stoppers else False
-        hears = self._ticked_at < self._observer.driver_at + self._config.drive_heartbeat_s
-        armed = hears and self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
+        assumed = any(stopper.ladder.assumed for stopper in self._stoppers) if self._stoppers else False
+        driver_alive = self._ticked_at < self._observer.driver_at + self._config.drive_heartbeat_s
+        armed = driver_alive and self._ledger.wanted.mark is Mark.LIVE and self._ledger.is_on_disk
         unproven = self._unproven() if self._state is State.TRIPPED else ""
         state, verdict, hard = self._state, self._verdict, self._hard.holds
         return Status(state, verdict, self._step, self._settled, self._reset, assumed, armed, hard, unproven)
 
     @property
-    def owes_the_flag(self) -> bool:
+    def has_unreported_flag(self) -> bool:
         """The driver does not know yet that it has to brake hard: the next tick reports it."""
-        return self._hard.holds and not (self._told is not None and self._told.brakes_hard)
+        return self._hard.holds and not (self._reported_status is not None and self._reported_status.brakes_hard)
 
     @property
     def verdict(self) -> Verdict:
@@ -150,11 +152,11 @@ class Watchdog:
     def keeps_relay(self) -> bool:
         """False on the last two rungs, and for a wheel that was seen not to brake: then a safety relay opens. Where a
         drive has shown that it keeps its power, it stays open until a reset, over restarts too."""
-        runaway = any(stopper.climb.runaway for stopper in self._stoppers)
-        return self._beats and not runaway and not self._opened
+        runaway = any(stopper.ladder.runaway for stopper in self._stoppers)
+        return self._sends_heartbeat and not runaway and not self._opened
 
     @property
-    def _beats(self) -> bool:
+    def _sends_heartbeat(self) -> bool:
         """False on the last two rungs: then the own heartbeat is withheld, and the guard requests with it."""
         return self._step < Step.HEARTBEAT_WITHHELD
 
@@ -178,7 +180,7 @@ class Watchdog:
     def on_lease(self, datagram: bytes, uid: int | None, now_s: float, pid: int | None = None) -> Refusal | None:
         """Take in a datagram from the lease socket, sent by the user `uid` and the process `pid`. Returns why it does
         not count."""
-        refusal = self._leases.take(datagram, uid, now_s, pid)
+        refusal = self._leases.take_datagram(datagram, uid, now_s, pid)
         lease = self._leases.last
         if refusal is None and lease is not None:
             self._envelope.order(lease.linear_mps, lease.angular_radps, now_s)
@@ -201,7 +203,7 @@ class Watchdog:
         """
         if self._state is State.TRIPPED or not self._ticked_at < self._lease_ends_at <= now_s:
             return []
-        view = replace(self._view, bus=self._observer.look(), lease_at=self._leases.valid_at)
+        view = replace(self._view, bus=self._observer.bus_view(), lease_at=self._leases.valid_at)
         self._expired = policy.lease_lost(view, self._config, now_s)
         if self._expired.cause is TripCause.NONE:
             return []
@@ -214,12 +216,12 @@ class Watchdog:
 
     def tick(self, now_s: float) -> list[Frame]:
         """Judge and act. Returns the frames to send at once, the stop first. To be called at least every 5 ms."""
-        self._view = self._look(now_s)
+        self._view = self._observe(now_s)
         self._longest_gap_s = max(self._longest_gap_s, self._view.tick_gap_s)
         self._ticked_at = now_s
         stop = self._judge(now_s)
         self._note_record(now_s)
-        return stop + self._tell(now_s)
+        return stop + self._due_frames(now_s)
 
     def _judge(self, now_s: float) -> list[Frame]:
         if self._state is State.TRIPPED:
@@ -242,7 +244,7 @@ class Watchdog:
 
     def end(self, now_s: float) -> None:
         """The process is requested to end: with a wheel in motion it must not leave without stopping it."""
-        view = self._look(now_s)
+        view = self._observe(now_s)
         axis = in_motion(view, self._config)
         if self._state is State.TRIPPED or axis is None:
             return
@@ -261,20 +263,20 @@ class Watchdog:
         layouts = {drive.node_id: drive.layout for drive in self._config.drives}
         return [frames.quick_stop(node_id, nodes.count(node_id), layout) for node_id, layout in layouts.items()]
 
-    def _look(self, now_s: float) -> View:
-        bus = self._observer.look()
-        self._hard.look(bus.axes)
+    def _observe(self, now_s: float) -> View:
+        bus = self._observer.bus_view()
+        self._hard.end_at_zero_setpoints(bus.axes)
         hard_since = self._hard.since
         self._observer.brake(self._hard.holds)
         bounds = self._envelope.advance(now_s, hard_since)
-        skew = self._pair.look(bus, bounds)
+        skew = self._left_right.check_setpoints(bus, bounds)
         gap_s = now_s - self._ticked_at
         leases, failed = self._leases, self._bus_failed_since
-        twist = self._twist.look(bus, now_s)
-        creep = self._creep.look(bus, bounds, now_s)
-        halt = self._halt.look(bus, leases.last, now_s, hard_since)
+        base_motion = self._twist.check_motion(bus, now_s)
+        at_rest = self._setpoint_at_rest.check_setpoints(bus, bounds, now_s)
+        ramp = self._ramp_to_zero.check_setpoints(bus, leases.last, now_s, hard_since)
         started_at, at = self._started_at, leases.valid_at
-        return View(bus, bounds, started_at, leases.last, at, skew, twist, creep, gap_s, failed, halt)
+        return View(bus, bounds, started_at, leases.last, at, skew, base_motion, at_rest, gap_s, failed, ramp)
 
     def _trip(self, verdict: Verdict, now_s: float) -> None:
         self.trips += 1
@@ -294,7 +296,7 @@ class Watchdog:
         """LIVE before there is power, and until all of it was seen to be off."""
         verdict = self._verdict
         if self._state is State.TRIPPED:
-            self._opened = self._opened or any(stopper.climb.defied for stopper in self._stoppers)
+            self._opened = self._opened or any(stopper.ladder.defied for stopper in self._stoppers)
             self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail, opened=self._opened)
         elif self._are_off(now_s):
             self._ledger.want(Mark.CLEAR)
@@ -316,22 +318,22 @@ class Watchdog:
 
     @property
     def _step(self) -> Step:
-        return max(stopper.climb.step for stopper in self._stoppers) if self._stoppers else Step.NONE
+        return max(stopper.ladder.step for stopper in self._stoppers) if self._stoppers else Step.NONE
 
-    def _tell(self, now_s: float) -> list[Frame]:
+    def _due_frames(self, now_s: float) -> list[Frame]:
         out: list[Frame] = []
         period_s = self._config.heartbeat_period_s
-        if now_s >= self._heartbeat_due and self._beats:
+        if now_s >= self._heartbeat_due and self._sends_heartbeat:
             self._heartbeat_due = max(self._heartbeat_due, now_s - period_s) + period_s
             out.append(frames.heartbeat())
-        if self._beats:
+        if self._sends_heartbeat:
             out += self._guard.tick(now_s)
         status = self.status
         is_due = now_s >= self._state_due
         if is_due:  # a frame for what is new comes between the others, and delays none of them
             self._state_due = max(self._state_due, now_s - STATE_PERIOD_S) + STATE_PERIOD_S
-        if is_due or status != self._told:
-            self._told = status
+        if is_due or status != self._reported_status:
+            self._reported_status = status
             out.append(self._state_frame(status, now_s))
         if now_s >= self._counters_due:
             self._counters_due = max(self._counters_due, now_s - COUNTERS_PERIOD_S) + COUNTERS_PERIOD_S
@@ -368,7 +370,7 @@ class Watchdog:
     def _answer(self, now_s: float) -> Answer:
         if self._state is not State.TRIPPED:
             return Answer.NOT_TRIPPED
-        view = self._look(now_s)
+        view = self._observe(now_s)
         fresh = all(stopper.is_fresh(now_s) for stopper in self._stoppers)
         unsupplied = self._opened and self._verdict.cause is TripCause.DRIVE_SILENT  # the relay may feed it
         stands = not unsupplied and policy.stands(self._verdict, view, self._config, now_s)

@@ -77,7 +77,7 @@ def test_the_driver_and_the_watchdog_see_both_wheels_as_they_turn(world: World) 
     world.drive(Twist2D(0.2, 0.5), seconds=2.0)
     assert world.snapshot.odometry.twist.linear_mps == pytest.approx(world.truth.linear_mps, abs=0.01)
     assert world.snapshot.odometry.twist.angular_radps == pytest.approx(world.truth.angular_radps, abs=0.03)
-    seen = [axis.velocity_mps for axis in watchdog(world)._observer.look().axes]
+    seen = [axis.velocity_mps for axis in watchdog(world)._observer.bus_view().axes]
     half_track_m = world.robot.base.track_m / 2.0
     assert seen == pytest.approx([0.2 - 0.5 * half_track_m, 0.2 + 0.5 * half_track_m], abs=0.02)
 

@@ -31,7 +31,7 @@ TAKES: Mapping[str, tuple[Take, type[Exception], str]] = {
         "from canbase_runtime.single_instance import bus_name, take; held = take('driver', bus_name({bus}))",
     ),
     "watchdog": (
-        lambda name: sole.take(_bus(name)),
+        lambda name: sole.hold_bus(_bus(name)),
         sole.TakenError,
         "from canbase_watchdog.single_instance import take; held = take({bus})",
     ),
@@ -101,7 +101,7 @@ def test_whoever_comes_second_is_told_who_holds_it_also_after_many_have_asked(
 
 RECORDS: Mapping[str, tuple[Take, type[Exception]]] = {
     "driver": (lambda folder: hold(Path(folder), "driver"), TakenError),
-    "watchdog": (lambda folder: sole.take_record(Path(folder) / "watchdog.latch"), sole.TakenError),
+    "watchdog": (lambda folder: sole.hold_record(Path(folder) / "watchdog.latch"), sole.TakenError),
 }
 
 

@@ -23,7 +23,7 @@ from canbase_velocity.delay import Delay, Sent
 from canbase_velocity.glitch import GlitchFilter
 from canbase_velocity.placement import HeldPlacement, Placement, PlacementError
 from canbase_watchdog import counts, overshoot, stopping_distance, twist
-from canbase_watchdog.envelope import Way
+from canbase_watchdog.envelope import DirectionBounds
 from support.chain_world import bench_robot
 from support.watchdog_story import config
 
@@ -198,10 +198,10 @@ def catching_up_is_bounded() -> None:
 
 
 def leases_allow_the_ceiling() -> None:
-    way = Way(1.0, 0.2, 0.0)
+    way = DirectionBounds(1.0, 0.2, 0.0)
     for at in range(OFTEN):
         way.order(RANDOM.choice((1e9, math.inf, -1e9, 0.3)), 0.01 * at, 0.01 * at + 1.0)
-        way.look(0.01 * at)
+        way.update_orders(0.01 * at)
         assert way.level <= 1.0
 
 
@@ -234,7 +234,7 @@ HOSTILE: dict[str, Callable[[], None]] = {
     "StoppingDistance._distance_m StoppingDistance._hardest_mps2": to_and_fro_is_no_distance_for_the_driver,
     "StoppingDistance._way_m": to_and_fro_is_no_distance_for_the_watchdog,
     "Overshoot._lack_mps Overshoot._lost_m": catching_up_is_bounded,
-    "Way.level": leases_allow_the_ceiling,
+    "DirectionBounds.level": leases_allow_the_ceiling,
     "TwistWatch._speeds": mean_speed_has_a_short_memory,
     "radius track": calibration_is_bounded,
 }

@@ -17,7 +17,7 @@ def test_a_wheel_that_rolls_as_it_says_does_not_drift() -> None:
     for n in range(200):
         wheel.sample(0.005 * min(n, 100), 0.5)
     assert abs(wheel.last.drift_m) < 0.0015  # 0.5 m/s² × 10 ms / 2 s of it, and half a count a sample
-    assert wheel.last.implausible == 0
+    assert wheel.last.implausible_samples == 0
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -28,7 +28,7 @@ def test_a_frozen_encoder_is_noticed_after_a_few_centimetres(mirrored: bool) -> 
     assert drifts[0] == pytest.approx(0.005, abs=2e-4)
     assert drifts[9] == pytest.approx(0.0457, abs=3e-4)  # 0.005 × (1 - 0.98^10) / 0.02
     assert drifts[11] > 0.05
-    assert [wheel.sample(0.5, 0.5, rolls=0.0).implausible for _ in range(3)] == [2, 3, 4]
+    assert [wheel.sample(0.5, 0.5, rolls=0.0).implausible_samples for _ in range(3)] == [2, 3, 4]
 
 
 def test_a_velocity_that_says_nothing_while_the_encoder_runs() -> None:
@@ -36,7 +36,7 @@ def test_a_velocity_that_says_nothing_while_the_encoder_runs() -> None:
     wheel.samples(500, 0.5, 0.5)
     drift_m = wheel.samples(12, 0.0, 0.5, rolls=0.5).drift_m
     assert drift_m == pytest.approx(-0.0518, abs=3e-4)  # 0.0025 × 0.98^11 + 0.005 × (1 - 0.98^11) / 0.02
-    assert wheel.last.implausible == 1
+    assert wheel.last.implausible_samples == 1
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_velocity_that_says_nothing_while_the_encoder_runs() -> None:
 def test_the_tolerance_of_the_drift(drift_per_sample: float, implausible: int) -> None:
     wheel = Wheel()
     wheel.way_m += drift_per_sample
-    assert wheel.sample(0.0, 0.0).implausible == implausible
+    assert wheel.sample(0.0, 0.0).implausible_samples == implausible
 
 
 def test_before_the_first_sample_the_wheel_is_taken_for_standing() -> None:
@@ -62,7 +62,7 @@ def test_a_small_error_that_lasts_is_forgotten_over_the_way_on_which_it_comes(ve
     wheel.samples(8000, velocity, velocity, rolls=0.9 * velocity)
     forgotten = velocity / 0.25 + 1.0 / 10.0  # DRIFT_M, DRIFT_S
     assert wheel.last.drift_m == pytest.approx(0.1 * velocity / forgotten, rel=0.03)
-    assert wheel.last.implausible == 0
+    assert wheel.last.implausible_samples == 0
 
 
 @pytest.mark.parametrize("velocity", [0.01, 0.03, 0.1, 0.5])
@@ -71,7 +71,7 @@ def test_an_encoder_that_stands_still_is_found_after_a_way_at_any_speed(velocity
     wheel = Wheel(mirrored)
     wheel.samples(2000, velocity, velocity)
     n = 0
-    while wheel.last.implausible < CONFIG.feedback_samples and n < 10_000:
+    while wheel.last.implausible_samples < CONFIG.feedback_samples and n < 10_000:
         wheel.sample(velocity, velocity, rolls=0.0)
         n += 1
     forgotten = 1.0 / 0.25 + 1.0 / (10.0 * velocity)
@@ -100,8 +100,8 @@ def test_one_jump_of_the_encoder_is_one_bad_sample_and_no_drift() -> None:
     wheel.samples(500, 0.5, 0.5)
     wheel.way_m += 7.0
     last = wheel.sample(0.5, 0.5)
-    assert (last.implausible, abs(last.drift_m) < 0.001) == (1, True)
-    assert wheel.sample(0.5, 0.5).implausible == 0
+    assert (last.implausible_samples, abs(last.drift_m) < 0.001) == (1, True)
+    assert wheel.sample(0.5, 0.5).implausible_samples == 0
 
 
 def test_a_jump_forgets_nothing_of_the_drift_before_it() -> None:
@@ -162,7 +162,7 @@ def test_the_farthest_jump_is_one() -> None:
     wheel = Wheel()
     wheel.watch.on_position(-(2**31))
     wheel.watch.on_velocity(0.0, True, True, 0.02)
-    assert wheel.last.implausible == 1
+    assert wheel.last.implausible_samples == 1
 
 
 def test_after_a_longer_time_the_step_may_be_longer() -> None:
@@ -170,7 +170,7 @@ def test_after_a_longer_time_the_step_may_be_longer() -> None:
     wheel.way_m += 0.26
     assert wheel.sample(0.0, 0.0, after_s=0.09).drift_m == pytest.approx(-0.26)
     wheel.way_m += 0.28
-    assert wheel.sample(0.0, 0.0, after_s=0.09).implausible == 2  # a jump after a drift
+    assert wheel.sample(0.0, 0.0, after_s=0.09).implausible_samples == 2  # a jump after a drift
 
 
 def test_an_encoder_that_jumps_again_and_again_is_bad_each_time() -> None:
@@ -178,7 +178,7 @@ def test_an_encoder_that_jumps_again_and_again_is_bad_each_time() -> None:
     counts = []
     for n in range(6):
         wheel.way_m = 5.0 * (n % 2)
-        counts.append(wheel.sample(0.0, 0.0, rolls=0.0).implausible)
+        counts.append(wheel.sample(0.0, 0.0, rolls=0.0).implausible_samples)
     assert counts == [0, 1, 2, 3, 4, 5]
 
 
@@ -211,7 +211,7 @@ def test_without_a_position_there_is_no_drift() -> None:
         watch.on_velocity(0.5, True, True, n / 100)
     watch.on_position(123_456)
     watch.on_velocity(0.5, True, True, 0.2)
-    assert (watch.last.drift_m, watch.last.implausible) == (0.0, 0)
+    assert (watch.last.drift_m, watch.last.implausible_samples) == (0.0, 0)
 
 
 def test_a_drift_outlives_the_power_and_is_forgotten_with_time() -> None:
@@ -220,10 +220,10 @@ def test_a_drift_outlives_the_power_and_is_forgotten_with_time() -> None:
     wheel.way_m += 0.04
     wheel.sample(0.0, 0.0)
     assert wheel.sample(0.0, 0.0, powered=False).drift_m == pytest.approx(-0.04 * 0.999)
-    assert wheel.last.implausible == 0
+    assert wheel.last.implausible_samples == 0
     wheel.way_m += 0.012
     wheel.sample(0.0, 0.0)
-    assert wheel.last.implausible == 1
+    assert wheel.last.implausible_samples == 1
     assert wheel.sample(0.0, 0.0, powered=False, after_s=10.0).drift_m == 0.0
     assert wheel.sample(0.0, 0.0, powered=False, after_s=11.0).drift_m == 0.0
 
@@ -231,10 +231,10 @@ def test_a_drift_outlives_the_power_and_is_forgotten_with_time() -> None:
 def test_a_reset_forgets_the_drift() -> None:
     wheel = Wheel()
     wheel.way_m += 0.055
-    assert wheel.sample(0.0, 0.0).implausible == 1
+    assert wheel.sample(0.0, 0.0).implausible_samples == 1
     wheel.sample(0.0, 0.0, powered=False)
     wheel.watch.trust()
-    assert (wheel.last.drift_m, wheel.sample(0.0, 0.0).implausible) == (0.0, 0)
+    assert (wheel.last.drift_m, wheel.sample(0.0, 0.0).implausible_samples) == (0.0, 0)
 
 
 # 1.8 m/s ── this process waits 0.06 s ── six samples at once: the first one has all the time, the others none
@@ -249,5 +249,5 @@ def test_samples_that_come_at_once_are_no_drift_until_one_comes_in_its_time(dead
         wheel.way_m += 0.0 if dead else 0.018
         wheel.watch.on_position(round(wheel.way_m * 10_000))
         wheel.watch.on_velocity(1.8, True, True, wheel.n / 1000)
-        assert wheel.last.implausible <= 1
-    assert (wheel.samples(5, 1.8, 1.8, rolls=0.0 if dead else None).implausible >= 3) == dead
+        assert wheel.last.implausible_samples <= 1
+    assert (wheel.samples(5, 1.8, 1.8, rolls=0.0 if dead else None).implausible_samples >= 3) == dead

@@ -355,7 +355,7 @@ def test_each_wheel_gets_what_its_place_makes_of_the_bounds() -> None:
 
 @pytest.mark.parametrize(("left", "right"), [(0.625, 0.625), (-0.375, -0.375), (-0.125, 0.375), (0.25, -0.25)])
 def test_at_the_very_limit_they_go_together(left: float, right: float) -> None:
-    assert Bounds(-0.25, 0.5, -0.5, 0.5).pair(left, right, track_m=0.5, tolerance_mps=0.125) == ""
+    assert Bounds(-0.25, 0.5, -0.5, 0.5).left_right(left, right, track_m=0.5, tolerance_mps=0.125) == ""
 
 
 @pytest.mark.parametrize(
@@ -375,7 +375,7 @@ def test_at_the_very_limit_they_go_together(left: float, right: float) -> None:
 )
 def test_two_wheels_together(left: float, right: float, words: str) -> None:
     bounds = Bounds(-0.1, 0.5, -0.5, 1.0)
-    assert bounds.pair(left, right, track_m=0.4, tolerance_mps=0.05 + 1e-9) == words
+    assert bounds.left_right(left, right, track_m=0.4, tolerance_mps=0.05 + 1e-9) == words
 
 
 # --- brakes hard: 0.12 s, then with the emergency deceleration (2 m/s²)

@@ -124,7 +124,7 @@ ANSWERS: tuple[tuple[str, bytes, list[int | None]], ...] = (
 
 
 def by_the_watchdog() -> Callable[[bytes], bytes | None]:
-    return GuardAnswers().take
+    return GuardAnswers().take_answer
 
 
 def by_the_driver() -> Callable[[bytes], bytes | None]:

@@ -59,13 +59,15 @@ def test_it_ends_once_no_setpoint_is_left_and_the_flag_is_gone(
     """Per wheel: the setpoint that was received last, and the one that a SYNC made effective [m/s]."""
     hard = braking(HARD) if flagged else braking(HARD, GENTLE)
     wheels = zip((LEFT, RIGHT), (left, right), strict=True)
-    hard.look([replace(axis, target_mps=target, setpoint_mps=setpoint) for axis, (target, setpoint) in wheels])
+    hard.end_at_zero_setpoints(
+        [replace(axis, target_mps=target, setpoint_mps=setpoint) for axis, (target, setpoint) in wheels]
+    )
     assert hard.holds is (flagged or not at_rest)
 
 
 def test_ended_it_begins_again_with_the_next_flag() -> None:
     hard = braking(HARD, GENTLE)
-    hard.look([LEFT, RIGHT])
+    hard.end_at_zero_setpoints([LEFT, RIGHT])
     hard.on_lease(HARD, 20.0)
     assert hard.since == 20.0
 

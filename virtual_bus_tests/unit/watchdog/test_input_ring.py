@@ -68,7 +68,7 @@ class Watched:
         self.story.on_step = self._look
 
     def _look(self) -> None:
-        trip = self.watch.look(self.story.watchdog, self.story.t)
+        trip = self.watch.due_trip(self.story.watchdog, self.story.t)
         if trip is not None:
             self.due.append((self.story.t, trip))
 
@@ -120,5 +120,5 @@ def test_a_trip_that_a_restart_found_on_disk_is_not_recorded_again(past: Past, i
     ring = InputRing(10.0, 0.0)
     watch = TripWatch(ring, past)
     watchdog = Watchdog(config(), 0.0, past)
-    assert (watch.look(watchdog, 0.005) is not None) == is_new
+    assert (watch.due_trip(watchdog, 0.005) is not None) == is_new
     assert [each[0] for each in ring.cut(0.005)] == [START, VERDICT]

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_watchdog.ladder import RUNGS, Braking, Climb, Look, Step, advance, first
+from canbase_watchdog.ladder import RUNGS, Braking, LadderPosition, NodeFeedback, Step, advance, first
 
 RULES = Braking(lag_s=0.1, least_mps2=0.5, tolerance_mps=0.05, tolerance_share=0.1, coasting_s=2.0, samples=3)
-BRAKING = Look(
+BRAKING = NodeFeedback(
     enabled=False,
     powered=True,
     standing=False,
@@ -27,20 +27,20 @@ BRAKING = Look(
 ENABLED = replace(BRAKING, enabled=True)
 STANDING = replace(BRAKING, powered=False, standing=True, speed_mps=0.0, begin_mps=0.0)
 ROLLING = replace(BRAKING, powered=False)
-FOOT = Climb(Step.QUICK_STOP, since=9.9, begin_mps=0.5)
-OFF = Climb(Step.DISABLE_VOLTAGE, since=9.9, begin_mps=0.5)
+FOOT = LadderPosition(Step.QUICK_STOP, since=9.9, begin_mps=0.5)
+OFF = LadderPosition(Step.DISABLE_VOLTAGE, since=9.9, begin_mps=0.5)
 
 
-def go(climb: Climb, look: Look, now_s: float) -> Climb:
-    return advance(climb, look, RULES, now_s)
+def go(position: LadderPosition, feedback: NodeFeedback, now_s: float) -> LadderPosition:
+    return advance(position, feedback, RULES, now_s)
 
 
-def fed(climb: Climb, look: Look, *samples: tuple[float, float]) -> Climb:
+def fed(position: LadderPosition, feedback: NodeFeedback, *samples: tuple[float, float]) -> LadderPosition:
     """Samples of (time, speed), each looked at as it comes and once more a moment later."""
     for at, speed_mps in samples:
-        sample = replace(look, seen_at=at, speed_mps=speed_mps)
-        climb = go(go(climb, sample, at), sample, at + 0.005)
-    return climb
+        sample = replace(feedback, seen_at=at, speed_mps=speed_mps)
+        position = go(go(position, sample, at), sample, at + 0.005)
+    return position
 
 
 def test_the_ladder_has_five_rungs_and_each_but_the_last_has_its_deadline() -> None:
@@ -50,15 +50,15 @@ def test_the_ladder_has_five_rungs_and_each_but_the_last_has_its_deadline() -> N
 
 
 def test_it_begins_with_the_quick_stop() -> None:
-    climb = first(BRAKING, 3.0)
-    assert (climb.step, climb.since, climb.begin_mps) == (Step.QUICK_STOP, 3.0, 0.5)
-    assert (climb.stopped, climb.runaway, climb.assumed, climb.against) == (False, False, False, 0)
+    position = first(BRAKING, 3.0)
+    assert (position.step, position.since, position.begin_mps) == (Step.QUICK_STOP, 3.0, 0.5)
+    assert (position.stopped, position.runaway, position.assumed, position.too_fast_samples) == (False, False, False, 0)
 
 
 # trip 9.900          10.050 obey: a drive that is still enabled, or not heard, is on the next rung
 #   |------------------|
 @pytest.mark.parametrize(
-    ("now_s", "look", "step"),
+    ("now_s", "feedback", "step"),
     [
         (10.049, ENABLED, Step.QUICK_STOP),
         (10.051, ENABLED, Step.PRE_OPERATIONAL),
@@ -76,8 +76,8 @@ def test_it_begins_with_the_quick_stop() -> None:
         (99.0, replace(ENABLED, present=False), Step.QUICK_STOP),  # no such node on the bus
     ],
 )
-def test_deadlines(now_s: float, look: Look, step: Step) -> None:
-    assert go(FOOT, look, now_s).step is step
+def test_deadlines(now_s: float, feedback: NodeFeedback, step: Step) -> None:
+    assert go(FOOT, feedback, now_s).step is step
 
 
 def test_at_the_very_deadline_it_climbs() -> None:
@@ -86,7 +86,7 @@ def test_at_the_very_deadline_it_climbs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("now_s", "look", "step"),
+    ("now_s", "feedback", "step"),
     [
         (9.999, BRAKING, Step.DISABLE_VOLTAGE),
         (10.001, BRAKING, Step.HEARTBEAT_WITHHELD),  # quick stop active has power still
@@ -94,8 +94,8 @@ def test_at_the_very_deadline_it_climbs() -> None:
         (10.101, ROLLING, Step.HEARTBEAT_WITHHELD),  # heard at 10.000, and never again
     ],
 )
-def test_power_off_is_obeyed_when_the_power_is_off(now_s: float, look: Look, step: Step) -> None:
-    assert go(OFF, look, now_s).step is step
+def test_power_off_is_obeyed_when_the_power_is_off(now_s: float, feedback: NodeFeedback, step: Step) -> None:
+    assert go(OFF, feedback, now_s).step is step
 
 
 # allowed: 0.5 × 1.1 + 0.05 = 0.60 m/s until 10.000, then 0.5 m/s² less
@@ -115,39 +115,39 @@ def test_power_off_is_obeyed_when_the_power_is_off(now_s: float, look: Look, ste
 def test_a_wheel_that_does_not_brake_has_its_power_taken_at_once(
     samples: list[tuple[float, float]], step: Step
 ) -> None:
-    climb = fed(replace(FOOT), BRAKING, *samples)
-    assert (climb.step, climb.runaway) == (step, step is Step.DISABLE_VOLTAGE)
+    position = fed(replace(FOOT), BRAKING, *samples)
+    assert (position.step, position.runaway) == (step, step is Step.DISABLE_VOLTAGE)
 
 
 def test_at_20_hz_two_samples_count() -> None:
     two = replace(RULES, samples=2)
-    look = replace(BRAKING, speed_mps=0.601)
-    climb = advance(FOOT, replace(look, seen_at=9.91), two, 9.91)
-    assert climb.step is Step.QUICK_STOP
-    assert advance(climb, replace(look, seen_at=9.96), two, 9.96).step is Step.DISABLE_VOLTAGE
+    feedback = replace(BRAKING, speed_mps=0.601)
+    position = advance(FOOT, replace(feedback, seen_at=9.91), two, 9.91)
+    assert position.step is Step.QUICK_STOP
+    assert advance(position, replace(feedback, seen_at=9.96), two, 9.96).step is Step.DISABLE_VOLTAGE
 
 
 def test_a_wheel_that_keeps_its_speed_within_the_bound_has_its_power_taken_too() -> None:
-    climb = go(FOOT, replace(BRAKING, unslowed=True), 10.0)
-    assert (climb.step, climb.runaway) == (Step.DISABLE_VOLTAGE, True)
+    position = go(FOOT, replace(BRAKING, unslowed=True), 10.0)
+    assert (position.step, position.runaway) == (Step.DISABLE_VOLTAGE, True)
     assert not go(FOOT, replace(STANDING, unslowed=True), 10.0).runaway
 
 
 def test_the_limit_itself_is_allowed() -> None:
     limit_mps = RULES.allowed_mps(0.5, 0.05)
     assert limit_mps == pytest.approx(0.6)
-    assert fed(FOOT, BRAKING, *[(9.95 + i / 1000, limit_mps) for i in range(4)]).against == 0
+    assert fed(FOOT, BRAKING, *[(9.95 + i / 1000, limit_mps) for i in range(4)]).too_fast_samples == 0
 
 
 def test_a_wheel_that_has_no_speed_brakes_though_its_standstill_is_not_proven() -> None:
-    climb = fed(FOOT, BRAKING, *[(11.3 + i / 100, 0.0) for i in range(4)])
-    assert (climb.step, climb.runaway, climb.against) == (Step.QUICK_STOP, False, 0)
+    position = fed(FOOT, BRAKING, *[(11.3 + i / 100, 0.0) for i in range(4)])
+    assert (position.step, position.runaway, position.too_fast_samples) == (Step.QUICK_STOP, False, 0)
 
 
 def test_a_rolling_wheel_without_power_and_one_that_stands_count_nothing_against_them() -> None:
     fast = [(9.91 + i / 100, 3.0) for i in range(5)]
-    assert fed(FOOT, ROLLING, *fast).against == 0
-    assert fed(FOOT, replace(BRAKING, standing=True, enabled=True), (11.3, 0.004)).against == 0
+    assert fed(FOOT, ROLLING, *fast).too_fast_samples == 0
+    assert fed(FOOT, replace(BRAKING, standing=True, enabled=True), (11.3, 0.004)).too_fast_samples == 0
 
 
 @pytest.mark.parametrize(
@@ -161,8 +161,8 @@ def test_a_rolling_wheel_without_power_and_one_that_stands_count_nothing_against
     ],
 )
 def test_a_runaway_leaves_out_the_rungs_that_leave_the_braking_to_the_drive(step: Step, above: Step) -> None:
-    climb = fed(replace(FOOT, step=step), BRAKING, (9.91, 3.0), (9.92, 3.0), (9.93, 3.0))
-    assert (climb.step, climb.runaway) == (above, True)
+    position = fed(replace(FOOT, step=step), BRAKING, (9.91, 3.0), (9.92, 3.0), (9.93, 3.0))
+    assert (position.step, position.runaway) == (above, True)
 
 
 def test_the_relay_stays_open_on_the_rungs_after_it() -> None:
@@ -174,8 +174,8 @@ def test_the_relay_stays_open_on_the_rungs_after_it() -> None:
 
 
 def test_a_sensor_that_lies_costs_the_power_at_once() -> None:
-    climb = go(FOOT, replace(BRAKING, trusted=False), 9.9)
-    assert (climb.step, climb.since, climb.runaway) == (Step.DISABLE_VOLTAGE, 9.9, False)
+    position = go(FOOT, replace(BRAKING, trusted=False), 9.9)
+    assert (position.step, position.since, position.runaway) == (Step.DISABLE_VOLTAGE, 9.9, False)
     assert go(replace(FOOT, step=Step.PRE_OPERATIONAL), replace(BRAKING, trusted=False), 9.9).step is (
         Step.DISABLE_VOLTAGE
     )
@@ -264,21 +264,23 @@ def test_old_feedback_does_not_end_it(seen_at: float) -> None:
 
 def test_enabled_again_after_it_stood_climbs_at_once() -> None:
     stood = replace(FOOT, stopped=True)
-    assert go(stood, replace(STANDING, enabled=True, powered=True), 10.0) == Climb(Step.PRE_OPERATIONAL, 10.0, 0.0)
+    assert go(stood, replace(STANDING, enabled=True, powered=True), 10.0) == LadderPosition(
+        Step.PRE_OPERATIONAL, 10.0, 0.0
+    )
     end = replace(FOOT, step=Step.HEARTBEAT_WITHHELD, stopped=True)
     again = go(end, replace(STANDING, enabled=True, powered=True), 10.0)
     assert (again.step, again.stopped, again.since) == (Step.HEARTBEAT_WITHHELD, False, 10.0)
 
 
 def test_moving_again_begins_the_same_rung_anew() -> None:
-    stood = Climb(Step.DISABLE_VOLTAGE, 9.9, 0.5, stopped=True)
-    assert go(stood, ROLLING, 10.0) == Climb(Step.DISABLE_VOLTAGE, 10.0, 0.5, off_since=10.0)
+    stood = LadderPosition(Step.DISABLE_VOLTAGE, 9.9, 0.5, stopped=True)
+    assert go(stood, ROLLING, 10.0) == LadderPosition(Step.DISABLE_VOLTAGE, 10.0, 0.5, off_since=10.0)
     assert go(replace(stood, runaway=True), ROLLING, 10.0).runaway
 
 
 @pytest.mark.parametrize(("step", "then"), [(Step.QUICK_STOP, Step.QUICK_STOP), (Step.DISABLE_VOLTAGE,) * 2])
 def test_a_stand_that_a_liar_showed_was_none(step: Step, then: Step) -> None:
-    stood = replace(FOOT, step=step, stopped=True, judged_at=STANDING.seen_at)
+    stood = replace(FOOT, step=step, stopped=True, sampled_at=STANDING.seen_at)
     again = go(stood, replace(STANDING, trusted=False), 99.0)
     assert (again.step, again.stopped, again.since) == (then, False, 99.0)
     assert go(again, replace(STANDING, trusted=False, seen_at=99.001), 99.001).step is Step.DISABLE_VOLTAGE
@@ -302,7 +304,7 @@ def test_a_drive_that_goes_on_holding_loses_its_power(now_s: float, step: Step) 
 
 
 def test_it_stays_stopped_while_it_stands() -> None:
-    stood = replace(FOOT, stopped=True, judged_at=STANDING.seen_at)
+    stood = replace(FOOT, stopped=True, sampled_at=STANDING.seen_at)
     assert go(stood, STANDING, 99.0) == stood
 
 
@@ -322,11 +324,11 @@ def test_rungs_follow_each_other_and_the_last_is_the_last(step: Step, above: Ste
 
 
 # power off ordered, own heartbeat withheld at 9.900 ── 0.1 s ── NMT reset node, if the drive says that it has power
-WITHHELD = Climb(Step.HEARTBEAT_WITHHELD, since=9.9, begin_mps=0.5)
+WITHHELD = LadderPosition(Step.HEARTBEAT_WITHHELD, since=9.9, begin_mps=0.5)
 
 
 @pytest.mark.parametrize(
-    ("now_s", "look", "step"),
+    ("now_s", "feedback", "step"),
     [
         (9.999, replace(BRAKING, seen_at=9.99), Step.HEARTBEAT_WITHHELD),
         (10.001, BRAKING, Step.RESET_NODE),
@@ -342,8 +344,10 @@ WITHHELD = Climb(Step.HEARTBEAT_WITHHELD, since=9.9, begin_mps=0.5)
         (10.001, replace(STANDING, seen_at=10.0), Step.HEARTBEAT_WITHHELD),
     ],
 )
-def test_only_a_drive_that_says_itself_that_it_kept_its_power_is_reset(now_s: float, look: Look, step: Step) -> None:
-    assert go(WITHHELD, look, now_s).step is step
+def test_only_a_drive_that_says_itself_that_it_kept_its_power_is_reset(
+    now_s: float, feedback: NodeFeedback, step: Step
+) -> None:
+    assert go(WITHHELD, feedback, now_s).step is step
 
 
 def test_at_its_very_deadline_it_is_reset() -> None:
@@ -353,19 +357,19 @@ def test_at_its_very_deadline_it_is_reset() -> None:
 def test_a_reset_drive_that_rolls_without_power_is_waited_for() -> None:
     reset = replace(WITHHELD, step=Step.RESET_NODE)
     for at in (10.0, 12.0, 99.0):
-        assert go(reset, replace(ROLLING, seen_at=at), at) == replace(reset, judged_at=at, off_since=at)
+        assert go(reset, replace(ROLLING, seen_at=at), at) == replace(reset, sampled_at=at, off_since=at)
 
 
-@pytest.mark.parametrize("look", [ENABLED, BRAKING, ROLLING])
-def test_after_a_reset_power_is_ordered_off_before_the_next_one(look: Look) -> None:
-    stood = Climb(Step.RESET_NODE, 9.9, 0.5, stopped=True)
-    off_since = math.inf if look.powered else 10.5
-    expected = Climb(Step.HEARTBEAT_WITHHELD, 10.5, 0.5, off_since=off_since)
-    assert go(stood, replace(look, seen_at=10.5), 10.5) == expected
+@pytest.mark.parametrize("feedback", [ENABLED, BRAKING, ROLLING])
+def test_after_a_reset_power_is_ordered_off_before_the_next_one(feedback: NodeFeedback) -> None:
+    stood = LadderPosition(Step.RESET_NODE, 9.9, 0.5, stopped=True)
+    off_since = math.inf if feedback.powered else 10.5
+    expected = LadderPosition(Step.HEARTBEAT_WITHHELD, 10.5, 0.5, off_since=off_since)
+    assert go(stood, replace(feedback, seen_at=10.5), 10.5) == expected
 
 
 @pytest.mark.parametrize("step", list(Step))
 def test_the_relay_is_left_for_a_drive_that_keeps_its_power_or_its_speed(step: Step) -> None:
-    climb = Climb(step, since=10.0, begin_mps=0.5)
-    assert climb.defied is (step is Step.RESET_NODE)
-    assert replace(climb, runaway=True).defied is True
+    position = LadderPosition(step, since=10.0, begin_mps=0.5)
+    assert position.defied is (step is Step.RESET_NODE)
+    assert replace(position, runaway=True).defied is True

@@ -119,33 +119,33 @@ def test_order(sequence: int, stamp_ns: int, refusal: Refusal | None) -> None:
 def test_a_replayed_series_never_counts_again() -> None:
     it = book()
     series = [lease(n, 10 + n / 50) for n in range(1, 6)]
-    assert [it.take(datagram, None, 10.1) for datagram in series] == [None] * 5
-    again = [it.take(datagram, None, 10.15) for datagram in series]
+    assert [it.take_datagram(datagram, None, 10.1) for datagram in series] == [None] * 5
+    again = [it.take_datagram(datagram, None, 10.15) for datagram in series]
     assert again == [Refusal.REORDERED] * 4 + [Refusal.REPEATED]
     assert it.last == Lease(5, 10_100_000_000, 0.0, 0.0, 0)
 
 
 def test_the_age_counts_from_the_stamp_when_the_datagram_was_late_and_from_arrival_when_it_is_ahead() -> None:
     it = book()
-    it.take(lease(1, 10.0), None, 10.2)
+    it.take_datagram(lease(1, 10.0), None, 10.2)
     assert it.valid_at == pytest.approx(10.0)
-    it.take(lease(2, 10.304), None, 10.3)
+    it.take_datagram(lease(2, 10.304), None, 10.3)
     assert it.valid_at == 10.3
 
 
 def test_only_the_configured_user_counts() -> None:
     it = book(uid=1000)
-    assert it.take(lease(1, 10.0), 1001, 10.0) is Refusal.SENDER
-    assert it.take(lease(1, 10.0), None, 10.0) is Refusal.SENDER
-    assert it.take(lease(1, 10.0), 1000, 10.0) is None
+    assert it.take_datagram(lease(1, 10.0), 1001, 10.0) is Refusal.SENDER
+    assert it.take_datagram(lease(1, 10.0), None, 10.0) is Refusal.SENDER
+    assert it.take_datagram(lease(1, 10.0), 1000, 10.0) is None
     assert it.refused[Refusal.SENDER] == 2
 
 
 def test_each_refusal_is_counted_by_its_reason_and_changes_nothing_else() -> None:
     it = book()
-    it.take(lease(5, 10.0), None, 10.0)
+    it.take_datagram(lease(5, 10.0), None, 10.0)
     for datagram in (b"", lease(6, 9.0), lease(6, 99.0), lease(5, 10.01), lease(4, 9.99)):
-        it.take(datagram, None, 10.02)
+        it.take_datagram(datagram, None, 10.02)
     counted = {why for why, number in it.refused.items() if number == 1}
     assert counted == {Refusal.LENGTH, Refusal.OLD, Refusal.FUTURE, Refusal.REPEATED, Refusal.REORDERED}
     assert sum(it.refused.values()) == 5
@@ -155,38 +155,38 @@ def test_each_refusal_is_counted_by_its_reason_and_changes_nothing_else() -> Non
 @given(st.binary(max_size=64) | st.binary(min_size=44, max_size=44).map(lambda b: b"CBL1" + b[4:]))
 def test_noise_is_no_lease(datagram: bytes) -> None:
     it = book()
-    assert it.take(datagram, None, 10.0) is not None
+    assert it.take_datagram(datagram, None, 10.0) is not None
     assert it.last is None
 
 
 # one filter sends ── a second one too: refused ── the first ends ── 0.25 s ── the second counts
 def test_leases_of_one_process_count() -> None:
     leases = book()
-    assert leases.take(lease(1, 1.0), 1000, 1.0, pid=7) is None
-    assert leases.take(lease(1, 1.1, 0.5), 1000, 1.1, pid=8) is Refusal.SECOND
-    assert leases.take(lease(2, 1.2), 1000, 1.2, pid=7) is None
-    assert leases.take(lease(2, 1.449, 0.5), 1000, 1.449, pid=8) is Refusal.SECOND
+    assert leases.take_datagram(lease(1, 1.0), 1000, 1.0, pid=7) is None
+    assert leases.take_datagram(lease(1, 1.1, 0.5), 1000, 1.1, pid=8) is Refusal.SECOND
+    assert leases.take_datagram(lease(2, 1.2), 1000, 1.2, pid=7) is None
+    assert leases.take_datagram(lease(2, 1.449, 0.5), 1000, 1.449, pid=8) is Refusal.SECOND
     assert leases.last is not None
     assert leases.last.linear_mps == 0.0
     assert leases.refused[Refusal.SECOND] == 2
-    assert leases.take(lease(3, 1.45, 0.5), 1000, 1.45, pid=8) is None
-    assert leases.take(lease(3, 1.5), 1000, 1.5, pid=7) is Refusal.SECOND
+    assert leases.take_datagram(lease(3, 1.45, 0.5), 1000, 1.45, pid=8) is None
+    assert leases.take_datagram(lease(3, 1.5), 1000, 1.5, pid=7) is Refusal.SECOND
 
 
 def test_a_refused_lease_of_the_first_does_not_keep_the_second_away() -> None:
     leases = book()
-    assert leases.take(lease(1, 1.0), 1000, 1.0, pid=7) is None
-    assert leases.take(b"garbage", 1000, 1.2, pid=7) is Refusal.LENGTH
-    assert leases.take(lease(2, 1.25), 1000, 1.25, pid=8) is None
+    assert leases.take_datagram(lease(1, 1.0), 1000, 1.0, pid=7) is None
+    assert leases.take_datagram(b"garbage", 1000, 1.2, pid=7) is Refusal.LENGTH
+    assert leases.take_datagram(lease(2, 1.25), 1000, 1.25, pid=8) is None
 
 
 def test_processes_of_another_pid_namespace_cannot_be_told_apart_and_do_not_count() -> None:
     """Two filters in containers: the kernel says 0 for both, and a second one would free what the first holds."""
     leases = book()
-    assert leases.take(lease(5000, 1.0), 1000, 1.0, pid=0) is Refusal.SENDER
-    assert leases.take(lease(1, 1.1, 0.5), 1000, 1.1, pid=0) is Refusal.SENDER
+    assert leases.take_datagram(lease(5000, 1.0), 1000, 1.0, pid=0) is Refusal.SENDER
+    assert leases.take_datagram(lease(1, 1.1, 0.5), 1000, 1.1, pid=0) is Refusal.SENDER
     assert leases.last is None
-    assert leases.take(lease(1, 1.2), 1000, 1.2, pid=1) is None
+    assert leases.take_datagram(lease(1, 1.2), 1000, 1.2, pid=1) is None
 
 
 @pytest.mark.parametrize("flags", range(16))

@@ -26,11 +26,11 @@ def observer(*drives: tuple[int, int]) -> Observer:
 
 
 def look(it: Observer) -> BusView:
-    return it.look()
+    return it.bus_view()
 
 
 def node(it: Observer, node_id: int) -> Node:
-    return next(each for each in it.look().nodes if each.node_id == node_id)
+    return next(each for each in it.bus_view().nodes if each.node_id == node_id)
 
 
 def rx(it: Observer, cob_id: int, data: str, now_s: float = 1.0) -> Axis:
@@ -42,14 +42,14 @@ def rx(it: Observer, cob_id: int, data: str, now_s: float = 1.0) -> Axis:
 def test_a_look_is_the_same_object_until_a_frame_comes_that_is_watched() -> None:
     it = observer()
     for cob_id in (0x080, 0x77F, 0x701, 0x581, 0x601, 0x181, 0x281, 0x201, 0x000):
-        before = it.look()
+        before = it.bus_view()
         it.on_frame(0x123, b"", 1.0)
-        assert it.look() is before
+        assert it.bus_view() is before
         it.on_frame(cob_id, b"", 1.0)  # also where it is too short to be understood
-        assert it.look() is not before, hex(cob_id)
-    before = it.look()
+        assert it.bus_view() is not before, hex(cob_id)
+    before = it.bus_view()
     it.trust()
-    assert it.look() is not before
+    assert it.bus_view() is not before
 
 
 def test_status_velocity_and_setpoint_of_a_single_axis() -> None:
@@ -63,8 +63,8 @@ def test_status_velocity_and_setpoint_of_a_single_axis() -> None:
     assert axis.target_mps == pytest.approx(0.3)
     assert (axis.asks_for_power, axis.command_at) == (True, 3.0)
     assert axis.fed_at == 1.0
-    assert node(it, 1).heard_at == 2.0
-    assert node(it, 2).heard_at == NEVER
+    assert node(it, 1).last_frame_at == 2.0
+    assert node(it, 2).last_frame_at == NEVER
 
 
 def test_a_velocity_of_16_bits_comes_with_the_status_where_both_have_room_in_one_frame() -> None:
@@ -78,7 +78,7 @@ def test_a_velocity_of_16_bits_comes_with_the_status_where_both_have_room_in_one
     axis = rx(it, 0x181, "37 02 10 00 00 00", 2.0)
     assert (axis.status_at, axis.velocity_at, axis.fed_at) == (2.0, 1.0, 1.0)
     rx(it, 0x181, "37 02 10 00 00 00 d4 fe 00", 3.0)
-    assert (it.dropped, it.look().axes[0].status_at) == (1, 2.0)
+    assert (it.dropped, it.bus_view().axes[0].status_at) == (1, 2.0)
 
 
 def test_the_second_axis_of_a_node_has_pdos_of_its_own() -> None:
@@ -208,12 +208,14 @@ def test_setpoints_and_samples_reach_the_feedback_of_their_axis() -> None:
         it.on_frame(0x202, bytes.fromhex("0f 00 64 00 00 00"), 1.0 + n / 100)
         it.on_frame(0x282, bytes.fromhex("d0 07 00 00"), 1.0 + n / 100)  # 2 m/s
     left, right = (axis.feedback for axis in look(it).axes)
-    assert (right.high_mps, right.outside, right.overspeed, left.outside) == pytest.approx((0.1, 3, 3, 0))
+    assert (right.high_mps, right.outside_samples, right.overspeed_samples, left.outside_samples) == pytest.approx(
+        (0.1, 3, 3, 0)
+    )
     for n in range(10):
         it.on_frame(0x182, struct.pack("<Hi", 0x0237, 2000 * n), 1.03 + n / 100)
         it.on_frame(0x282, bytes(4), 1.03 + n / 100)
     drift = look(it).axes[1].feedback
-    assert drift.implausible >= 5  # the encoder runs at 20 m/s
+    assert drift.implausible_samples >= 5  # the encoder runs at 20 m/s
     it.on_frame(0x582, bytes.fromhex("43 6c 60 00 d0 07 00 00"), 1.2)  # an SDO answer is no sample of a SYNC
     assert look(it).axes[1].feedback is drift
 
@@ -232,7 +234,7 @@ def test_answers_to_sdo_readings_count_as_feedback() -> None:
     assert rx(it, 0x585, "43 6c 60 00 2c 01 00 00", 1.5).velocity_mps == pytest.approx(0.3)
     rx(it, 0x585, "43 6c 68 00 64 00 00 00", 2.0)
     assert look(it).axes[1].velocity_mps == pytest.approx(0.1)
-    assert node(it, 5).heard_at == 2.0
+    assert node(it, 5).last_frame_at == 2.0
 
 
 def test_answers_to_sdo_readings_feed_nobody() -> None:
@@ -282,7 +284,7 @@ def test_other_sdo_answers_only_show_that_the_node_lives() -> None:
     for data in ("60 40 60 00 00 00 00 00", "80 41 60 00 00 00 02 06", "43 18 10 01 00 00 00 00", "00"):
         it.on_frame(0x581, bytes.fromhex(data), 1.0)
     assert look(it).axes == before
-    assert (node(it, 1).heard_at, it.dropped) == (1.0, 0)
+    assert (node(it, 1).last_frame_at, it.dropped) == (1.0, 0)
 
 
 # SYNC: | | | |              | | |       a gap of 0.1 s begins a new run
@@ -299,7 +301,7 @@ def test_heartbeats() -> None:
     it.on_frame(0x701, b"\x05", 1.0)
     it.on_frame(0x77F, b"\x05", 2.0)
     view = look(it)
-    assert (node(it, 1).heartbeat_at, node(it, 1).heard_at, view.driver_at) == (1.0, 1.0, 2.0)
+    assert (node(it, 1).heartbeat_at, node(it, 1).last_frame_at, view.driver_at) == (1.0, 1.0, 2.0)
 
 
 @pytest.mark.parametrize(

@@ -43,12 +43,12 @@ def test_a_node_is_found_by_its_id_wherever_it_stands() -> None:
 @pytest.mark.parametrize("check", [check for check in CHECKS if check.by_bus], ids=lambda check: check.cause.name)
 def test_what_is_judged_once_a_frame_depends_on_the_bus_alone(check: Check) -> None:
     """Otherwise it would be found late."""
-    bad = {"overspeed": 9, "outside": 9, "implausible": 9}
+    bad = {"overspeed_samples": 9, "outside_samples": 9, "implausible_samples": 9}
     axis = replace(
         LEFT,
         feedback=replace(LEFT.feedback, **bad),
         evidence=replace(LEFT.evidence, unseen=True),
-        push=replace(LEFT.push, overdue_s=9.0),
+        torque=replace(LEFT.torque, overdue_s=9.0),
         missed_setpoints=1e6,
         double_answers=1e6,
     )
@@ -64,7 +64,7 @@ def test_what_is_judged_once_a_frame_depends_on_the_bus_alone(check: Check) -> N
 
 
 def test_a_bus_that_was_fine_is_judged_again_by_what_depends_on_more() -> None:
-    fast = of(replace(LEFT, feedback=replace(LEFT.feedback, overspeed=9)), RIGHT)
+    fast = of(replace(LEFT, feedback=replace(LEFT.feedback, overspeed_samples=9)), RIGHT)
     assert decide(fast, CONFIG, NOW, WELL.bus).cause is TripCause.OVERSPEED, "another bus"
     assert decide(fast, CONFIG, NOW, fast.bus) == FINE
     late = replace(fast, lease_at=NOW - 1.0)

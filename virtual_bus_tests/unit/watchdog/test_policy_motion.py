@@ -15,7 +15,7 @@ from canbase_watchdog.motion_evidence import Evidence
 from canbase_watchdog.plausibility import Feedback
 from canbase_watchdog.policy import CHECKS, clears_on, decide, stands
 from canbase_watchdog.second_master import Sign
-from canbase_watchdog.torque import Push
+from canbase_watchdog.torque_evidence import TorqueEvidence
 from canbase_watchdog.trip_cause import FINE, TripCause, Verdict
 from canbase_watchdog.view import Axis
 from support.watchdog_views import AT_REST, CONFIG, LEFT, NOW, OFF, RIGHT, STANDING, cause, of, well
@@ -110,9 +110,9 @@ def test_setpoints_that_do_not_go_together_are_about_no_single_node() -> None:
 # --- feedback: so many samples in a row
 
 COUNTS = [
-    ("outside", TripCause.MOTION_OUTSIDE),
-    ("overspeed", TripCause.OVERSPEED),
-    ("implausible", TripCause.FEEDBACK_IMPLAUSIBLE),
+    ("outside_samples", TripCause.MOTION_OUTSIDE),
+    ("overspeed_samples", TripCause.OVERSPEED),
+    ("implausible_samples", TripCause.FEEDBACK_IMPLAUSIBLE),
 ]
 
 
@@ -132,17 +132,17 @@ def test_feedback_counts_after_five_bad_samples_in_a_row(
 def test_the_sentences_about_feedback_have_the_values() -> None:
     fast = replace(LEFT, velocity_mps=1.3)
     slow = replace(CONFIG, max_wheel_mps=0.5)
-    assert decide(of(replace(AT_REST, feedback=Feedback(overspeed=5))), slow, NOW).detail.endswith(
+    assert decide(of(replace(AT_REST, feedback=Feedback(overspeed_samples=5))), slow, NOW).detail.endswith(
         "(allowed 0.600 m/s)"
     )
     right = replace(STANDING, target_mps=0.3)
-    assert detail(replace(fast, feedback=Feedback(-0.1, 0.5, outside=5)), right) == (
+    assert detail(replace(fast, feedback=Feedback(-0.1, 0.5, outside_samples=5)), right) == (
         "wheel_1_0 turns at 1.300 m/s, its setpoints allow -0.100 to 0.500 m/s"
     )
-    assert detail(replace(fast, feedback=Feedback(overspeed=5)), right) == (
+    assert detail(replace(fast, feedback=Feedback(overspeed_samples=5)), right) == (
         "wheel_1_0 turns at 1.300 m/s (allowed 1.200 m/s)"
     )
-    assert detail(replace(fast, feedback=Feedback(implausible=5, drift_m=-0.06)), right) == (
+    assert detail(replace(fast, feedback=Feedback(implausible_samples=5, drift_m=-0.06)), right) == (
         "wheel_1_0 reports 1.300 m/s, and its encoder contradicts it: -0.060 m apart (allowed 0.050 m)"
     )
     verdicts = [
@@ -154,8 +154,8 @@ def test_the_sentences_about_feedback_have_the_values() -> None:
 # --- sensors that show what no wheel can do, and wheels that do not show their orders
 
 EVIDENCE = [
-    (Evidence(halted=5, setpoint_mps=0.3), TripCause.FEEDBACK_IMPLAUSIBLE),
-    (Evidence(jolts=5), TripCause.FEEDBACK_IMPLAUSIBLE),
+    (Evidence(halted_samples=5, setpoint_mps=0.3), TripCause.FEEDBACK_IMPLAUSIBLE),
+    (Evidence(velocity_jumps=5), TripCause.FEEDBACK_IMPLAUSIBLE),
     (Evidence(unseen=True, both_s=0.3, both_m=0.09, setpoint_mps=0.3), TripCause.MOTION_MISSING),
     (Evidence(behind_s=0.5, ordered_mps=0.3), TripCause.MOTION_MISSING),
     (Evidence(strained_s=0.25, setpoint_mps=0.3), TripCause.MOTION_MISSING),
@@ -178,8 +178,8 @@ def test_evidence_against_a_wheel_trips(evidence: Evidence, found: TripCause) ->
 @pytest.mark.parametrize(
     "evidence",
     [
-        Evidence(halted=4),
-        Evidence(jolts=4),
+        Evidence(halted_samples=4),
+        Evidence(velocity_jumps=4),
         Evidence(unseen_s=9.0, unseen_m=9.0),
         Evidence(behind_s=0.499),
         Evidence(strained_s=0.249),
@@ -211,25 +211,25 @@ def test_the_sentences_about_evidence_have_the_values() -> None:
 
 @pytest.mark.parametrize(("overdue_s", "trips"), [(0.199, 0), (0.2, 17), (0.5, 17)])
 def test_a_drive_that_pushes_at_a_stand_and_does_not_let_go_trips(overdue_s: float, trips: int) -> None:
-    held = replace(AT_REST, push=Push(0.4, 0.05, owes=True, overdue_s=overdue_s))
+    held = replace(AT_REST, torque=TorqueEvidence(0.4, 0.05, release_due=True, overdue_s=overdue_s))
     assert cause(of(held)) == trips
     assert cause(of(replace(held, state=DriveState.SWITCH_ON_DISABLED), replace(OFF, drive=RIGHT.drive))) == 0
 
 
 def test_the_sentence_about_power_at_a_stand_has_the_values() -> None:
-    verdict = decide(of(AT_REST, replace(STANDING, push=Push(0.4, overdue_s=0.3))), CONFIG, NOW)
+    verdict = decide(of(AT_REST, replace(STANDING, torque=TorqueEvidence(0.4, overdue_s=0.3))), CONFIG, NOW)
     assert (verdict.cause, verdict.node_id) == (TripCause.POWER_AT_STAND, 2)
     assert verdict.detail == (
         "wheel_2_0 is ordered 0.000 m/s, reports 0.000 m/s and has been held with 40% of the rated torque for "
         "0.300 s (allowed 0.200 s) without release of the wheel: its encoder may be dead "
         "(watchdog.stand_proof, watchdog.stand_answer_s)"
     )
-    untold = replace(AT_REST, push=Push(None, overdue_s=0.3))
+    untold = replace(AT_REST, torque=TorqueEvidence(None, overdue_s=0.3))
     assert "held with a torque that the drive does not report for 0.300 s" in detail(untold)
 
 
 def test_the_sentence_about_a_push_in_vain_has_the_torque() -> None:
-    assert detail(replace(AT_REST, push=Push(0.7, vain_s=CONFIG.motion_missing_s))) == (
+    assert detail(replace(AT_REST, torque=TorqueEvidence(0.7, vain_s=CONFIG.motion_missing_s))) == (
         "wheel_1_0 is pushed with 70% of the rated torque and shows no motion for 0.250 s (allowed 0.250 s), "
         "ordered 0.000 m/s: see encoder, motor, wheel"
     )
@@ -414,7 +414,9 @@ def test_each_cause_says_what_a_reset_needs() -> None:
 )
 def test_of_motion_nothing_is_left_when_the_wheels_stand(tripped_by: TripCause) -> None:
     """A drive in fault must not keep the reset away: the driver resets the fault only after it."""
-    fault = replace(OFF, state=DriveState.FAULT, feedback=Feedback(outside=9, overspeed=9, implausible=9))
+    fault = replace(
+        OFF, state=DriveState.FAULT, feedback=Feedback(outside_samples=9, overspeed_samples=9, implausible_samples=9)
+    )
     assert not stands(Verdict(tripped_by, 1), of(fault), CONFIG, NOW)
 
 

@@ -262,7 +262,7 @@ def enabled() -> Observer:
 def after(cob_id: int, data: str, it: Observer | None = None) -> Sign | None:
     it = it or enabled()
     it.on_frame(cob_id, bytes.fromhex(data), 2.0)
-    return it.look().foreign
+    return it.bus_view().foreign
 
 
 @pytest.mark.parametrize("command", ["01", "02", "80", "81", "82"])
@@ -416,7 +416,7 @@ def test_where_own_frames_do_not_come_back_any_77e_that_could_keep_a_drive_alive
     period_s: float, sign: bool
 ) -> None:
     """The drives allow 0.3 s without one."""
-    foreign = Foreign(CONFIG, echo=False)
+    foreign = Foreign(CONFIG, loopback=False)
     for n in range(20):
         foreign.on_watchdog_heartbeat(n * period_s)
     assert (foreign.last is not None) is sign
@@ -492,7 +492,7 @@ def test_another_driver_at_rest_sends_the_same_setpoints_and_no_heartbeat_of_thi
 
 def test_where_own_frames_do_not_come_back_those_of_the_driver_decide() -> None:
     bus = Bus()
-    bus.foreign = Foreign(CONFIG, echo=False)
+    bus.foreign = Foreign(CONFIG, loopback=False)
     copied(bus, own=False)
     assert bus.sign is not None
     assert bus.sign.copied is True
@@ -523,4 +523,4 @@ def test_the_feedback_of_a_drive_that_comes_twice_with_the_same_data_is_known_as
             at = 1.0 + n / 100 + turn * 0.0005
             it.on_frame(0x181, bytes.fromhex("37 02") + n.to_bytes(4, "little"), at)
             it.on_frame(0x182, bytes.fromhex("37 02") + (2 * n + turn).to_bytes(4, "little"), at)
-    assert [axis.copied_at for axis in it.look().axes] == [1.0405, -math.inf]
+    assert [axis.copied_at for axis in it.bus_view().axes] == [1.0405, -math.inf]

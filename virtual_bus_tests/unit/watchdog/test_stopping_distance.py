@@ -11,7 +11,7 @@ import pytest
 
 from canbase_watchdog.counts import difference
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.standing import StandWatch
+from canbase_watchdog.standstill import StandstillWatch
 from canbase_watchdog.view import Axis
 from support.watchdog_story import config
 
@@ -25,7 +25,7 @@ class Wheel:
     powered: bool = True
     now_s: float = 100.0
     at_m: float = 0.0
-    watch: StandWatch = field(default_factory=lambda: StandWatch(DRIVE, CONFIG))
+    watch: StandstillWatch = field(default_factory=lambda: StandstillWatch(DRIVE, CONFIG))
 
     def sample(self, step_m: float, velocity_mps: float, after_s: float = CYCLE_S) -> None:
         self.now_s += after_s

@@ -28,7 +28,7 @@ class Machine:
 
     status = Status(State.WATCHING, FINE, Step.NONE, True, (0, Answer.NONE))
     dropped_frames, datagrams_dropped, keeps_relay = 0, 0, True
-    owes_the_flag, request_problem = False, ""
+    has_unreported_flag, request_problem = False, ""
 
     def __init__(self, expires_at: float) -> None:
         self.now_s = START_S

@@ -260,7 +260,7 @@ def test_noise_neither_raises_nor_fills_the_memory_nor_lets_anything_but_stops_o
 def held(watchdog: Watchdog) -> int:
     """How many things it holds in its queues, which are all that grows with time."""
     envelope, foreign = watchdog._envelope, watchdog._observer._foreign
-    peaks = [peak for way in envelope._ways for peak in (way._high, way._low)]
+    peaks = [peak for way in envelope._directions for peak in (way._high, way._low)]
     for record in watchdog._observer._records.values():
         peaks += [record.feedback._forward, record.feedback._backward]
     paces = (foreign._syncs, foreign._heartbeats, foreign._disorder)

@@ -53,7 +53,7 @@ class Base:
             Axis(drive, state=state, setpoint_mps=setpoint, velocity_mps=velocity)
             for drive, setpoint, velocity in zip(self.config.drives, ordered, measured or ordered, strict=False)
         ]
-        return self.watch.look(BusView(tuple(axes), (), sync_at=self.n / HZ), self.n / HZ)
+        return self.watch.check_motion(BusView(tuple(axes), (), sync_at=self.n / HZ), self.n / HZ)
 
     def trips_after(self, ordered: tuple[float, float], measured: tuple[float, float], most: int = 200) -> int | None:
         """So many SYNCs; None: it does not."""
@@ -253,7 +253,7 @@ def test_looking_twice_at_one_sync_is_looking_once() -> None:
     assert base.trips_after((0.25, 0.25), (0.125, 0.25), 16) is None
     axes = tuple(Axis(d, state=DriveState.OPERATION_ENABLED, velocity_mps=9.0) for d in BIT)
     same = BusView(axes, (), sync_at=base.n / HZ)
-    assert [base.watch.look(same, base.n / HZ + n) for n in range(9)] == [""] * 9
+    assert [base.watch.check_motion(same, base.n / HZ + n) for n in range(9)] == [""] * 9
     assert base.cycle((0.25, 0.25), (0.125, 0.25)) != ""
 
 
@@ -280,8 +280,8 @@ def said(speeds: tuple[float, ...]) -> list[str]:
         for drive, speed in zip(drives, speeds, strict=True)
     ]
     off = tuple(replace(axis, state=DriveState.SWITCHED_ON) for axis in axes)
-    watch.look(BusView(off, (), sync_at=0.0), 0.0)
-    return [watch.look(BusView(tuple(axes), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)]
+    watch.check_motion(BusView(off, (), sync_at=0.0), 0.0)
+    return [watch.check_motion(BusView(tuple(axes), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)]
 
 
 @pytest.mark.parametrize("speeds", [(0.25, 0.25, 0.125), (0.25, 0.25, 0.25, 0.125)])
@@ -299,7 +299,7 @@ def test_the_setpoint_of_a_side_is_the_mean_of_its_wheels() -> None:
 def test_a_base_of_one_side_has_no_twist() -> None:
     watch = TwistWatch(replace(CONFIG, drives=BIT[:1]), 0.0)
     axis = Axis(BIT[0], state=DriveState.OPERATION_ENABLED, velocity_mps=9.0)
-    assert [watch.look(BusView((axis,), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)] == [""] * 39
+    assert [watch.check_motion(BusView((axis,), (), sync_at=n / HZ), n / HZ) for n in range(1, 40)] == [""] * 39
 
 
 def test_reach_is_what_was_ordered_within_the_lag_and_falls() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_watchdog.torque import Push, PushWatch
+from canbase_watchdog.torque_evidence import TorqueEvidence, TorqueWatch
 from support.watchdog_story import config
 
 CYCLE_S = 0.01
@@ -19,7 +19,7 @@ class Bus:
     """One drive and its watch; the encoder shows `counts`."""
 
     def __init__(self, proof: bool = True) -> None:
-        self.watch = PushWatch(DRIVE, replace(CONFIG, stand_proof=proof))
+        self.watch = TorqueWatch(DRIVE, replace(CONFIG, stand_proof=proof))
         self.cycle, self.counts = 0, 1000
 
     def run(
@@ -30,7 +30,7 @@ class Bus:
         rests: bool = True,
         powered: bool = True,
         step: int = 0,
-    ) -> Push:
+    ) -> TorqueEvidence:
         for _ in range(cycles):
             self.cycle += 1
             self.counts += step
@@ -53,7 +53,7 @@ def test_power_at_a_stand_trips_after_impulse_and_answer(share: float | None, cy
     bus.run(cycles - 2, share)
     assert not bus.watch.overdue
     bus.run(3, share)
-    assert (bus.watch.overdue, bus.watch.lies) == (True, True)
+    assert (bus.watch.overdue, bus.watch.contradicts_encoder) == (True, True)
 
 
 def test_a_torque_that_was_never_told_but_as_zero_is_not_known() -> None:
@@ -68,7 +68,7 @@ def test_a_torque_that_is_known_may_be_less_than_moves_a_wheel() -> None:
     bus = Bus().moved()
     bus.run(1, 0.0)
     last = bus.run(500, 0.0099)
-    assert (last.share, last.owes, last.overdue_s) == (0.0099, True, 0.0)
+    assert (last.share, last.release_due, last.overdue_s) == (0.0099, True, 0.0)
     assert last.pushed_s < 0.01
 
 
@@ -83,7 +83,7 @@ def test_it_is_over_with_the_first_sample_without_power_and_owed_again_by_the_ne
     bus = Bus().moved()
     assert bus.run(10, 1.0).overdue_s > 0.0
     off = bus.run(1, 1.0, powered=False)
-    assert (off.pushed_s, off.owes, off.overdue_s) == (0.0, False, 0.0)
+    assert (off.pushed_s, off.release_due, off.overdue_s) == (0.0, False, 0.0)
     assert off.vain_s == pytest.approx(0.09)
     assert bus.run(100, 0.5).overdue_s == 0.0
     bus.run(1, 1.0, 0.001)
@@ -110,7 +110,7 @@ def test_pushed_in_vain_is_a_torque_far_from_the_one_at_the_last_sign_of_life(sh
     bus.run(49, share, 0.01)
     assert not bus.watch.in_vain
     bus.run(1, share, 0.01)
-    assert (bus.watch.in_vain, bus.watch.lies) == (counts, counts)
+    assert (bus.watch.in_vain, bus.watch.contradicts_encoder) == (counts, counts)
 
 
 @pytest.mark.parametrize(("share", "samples"), [(1.1, 25), (3.0, 25), (-3.0, 25), (-0.9, 28), (-0.61, 41)])
@@ -197,7 +197,7 @@ def test_a_torque_that_changes_unasked_has_to_be_released_and_is_a_dead_sensor_t
     bus.run(20, 0.2)
     assert bus.run(4, 0.71).overdue_s == 0.0
     assert bus.run(1, 0.71).overdue_s == CONFIG.stand_answer_s
-    assert bus.watch.lies
+    assert bus.watch.contradicts_encoder
 
 
 @pytest.mark.parametrize("change", [{"rests": False}, {"setpoint": 0.01}])
@@ -217,12 +217,12 @@ def test_a_reset_begins_anew() -> None:
     bus = Bus().moved()
     bus.run(30, 1.0, 0.1)
     bus.watch.trust()
-    assert bus.watch.last == Push()
-    assert not bus.watch.lies
+    assert bus.watch.last == TorqueEvidence()
+    assert not bus.watch.contradicts_encoder
 
 
 def test_a_gap_counts_as_a_tenth_of_a_second_and_a_time_that_went_back_as_nothing() -> None:
-    watch = PushWatch(DRIVE, CONFIG)
+    watch = TorqueWatch(DRIVE, CONFIG)
     watch.on_sync(0.1, False)
     for at in (0.0, 60.0, 59.0):
         watch.on_sample(0.4, True, at)

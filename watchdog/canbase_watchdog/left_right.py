@@ -14,7 +14,7 @@ from canbase_watchdog.view import NEVER, Axis, BusView
 SYNCS = 2
 
 
-class PairWatch:
+class LeftRightWatch:
     """Remembers whether the setpoints of the last SYNCs went together."""
 
     def __init__(self, config: WatchdogConfig) -> None:
@@ -24,7 +24,7 @@ class PairWatch:
         self._sync_at = NEVER
         self._bad = 0
 
-    def look(self, bus: BusView, bounds: Bounds) -> str:
+    def check_setpoints(self, bus: BusView, bounds: Bounds) -> str:
         """Why they did not go together in the last SYNCS that showed it, empty when they did."""
         if bus.sync_at == self._sync_at:
             return ""
@@ -47,7 +47,7 @@ class PairWatch:
         low_mps, high_mps = bounds.wheel(config.track_m / 2.0)
         share = config.target_tolerance_share * max(abs(low_mps), abs(high_mps))
         tolerance_mps = config.target_tolerance_mps + self._coarsest_mps + share
-        return bounds.pairs(lefts, rights, config.track_m, tolerance_mps)
+        return bounds.all_left_right(lefts, rights, config.track_m, tolerance_mps)
 
 
 def _speeds(axes: tuple[Axis, ...], side: str) -> list[float]:

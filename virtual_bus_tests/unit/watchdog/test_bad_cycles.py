@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_watchdog.tally import Tally
+from canbase_watchdog.bad_cycles import BadCycles
 
 
 def count(pattern: str) -> float:
-    tally = Tally()
+    cycles = BadCycles()
     for each in pattern:
-        tally.count(each == "x")
-    return tally.value
+        cycles.count(each == "x")
+    return cycles.value
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def test_a_bad_cycle_is_one_and_a_good_one_half_of_it_back(pattern: str, value: 
     assert count(pattern) == value
 
 
-# the first tally sends one frame a cycle, with a drift: none, then two; the second is two drives with one node id
+# the first drive sends one frame a cycle, with a drift: none, then two; the second is two drives with one node id
 @pytest.mark.parametrize(
     ("frames_a_cycle", "value"),
     [
@@ -40,10 +40,10 @@ def test_a_bad_cycle_is_one_and_a_good_one_half_of_it_back(pattern: str, value: 
 def test_two_frames_in_a_cycle_and_none_in_another_make_up_for_each_other(
     frames_a_cycle: list[int], value: float
 ) -> None:
-    tally = Tally()
+    cycles = BadCycles()
     for frames in frames_a_cycle:
-        tally.balance(frames)
-    assert tally.value == value
+        cycles.balance(frames)
+    assert cycles.value == value
 
 
 @pytest.mark.parametrize(("pattern", "value"), [("xx.....", 0.0), ("x..x", 1.0)])
@@ -56,7 +56,7 @@ def test_one_bad_cycle_in_three_does_not_add_up() -> None:
 
 
 def test_cleared_it_begins_anew() -> None:
-    tally = Tally()
-    tally.count(True)
-    tally.clear()
-    assert tally.value == 0.0
+    cycles = BadCycles()
+    cycles.count(True)
+    cycles.clear()
+    assert cycles.value == 0.0

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_watchdog.creep import CreepWatch
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
 from canbase_watchdog.policy import decide
+from canbase_watchdog.setpoint_at_rest import SetpointAtRestWatch
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.view import Axis, BusView
 from canbase_watchdog.watchdog import State
@@ -24,24 +24,24 @@ HOLD_S = config().order_hold_s
 CREEPS = replace(AT_REST, target_mps=0.001)
 
 
-def look(watch: CreepWatch, axis: Axis, bounds: Bounds, now_s: float) -> str:
-    return watch.look(BusView((AT_REST, axis), ()), bounds, now_s)
+def check(watch: SetpointAtRestWatch, axis: Axis, bounds: Bounds, now_s: float) -> str:
+    return watch.check_setpoints(BusView((AT_REST, axis), ()), bounds, now_s)
 
 
 @pytest.mark.parametrize("target_mps", [0.001, -0.001, 0.029, 0.8])
 def test_a_setpoint_that_nothing_allows_is_told_after_the_hold_and_not_before(target_mps: float) -> None:
-    watch = CreepWatch(config())
+    watch = SetpointAtRestWatch(config())
     axis = replace(AT_REST, target_mps=target_mps)
-    assert look(watch, axis, REST, 10.0) == ""
-    assert look(watch, axis, REST, 10.0 + HOLD_S - 0.001) == ""
-    assert f"{target_mps:.4f} m/s for 0.35" in look(watch, axis, REST, 10.0 + HOLD_S + 0.001)
+    assert check(watch, axis, REST, 10.0) == ""
+    assert check(watch, axis, REST, 10.0 + HOLD_S - 0.001) == ""
+    assert f"{target_mps:.4f} m/s for 0.35" in check(watch, axis, REST, 10.0 + HOLD_S + 0.001)
 
 
 def test_what_it_tells_does_not_grow_while_nobody_hears_the_drive_any_more() -> None:
     """A driver that died and a cable that is cut leave the last setpoint standing: the trip stays one and the same."""
-    watch = CreepWatch(config())
-    look(watch, CREEPS, REST, 10.0)
-    told = {look(watch, CREEPS, REST, 10.0 + HOLD_S + 0.1 * step) for step in range(1, 600)}
+    watch = SetpointAtRestWatch(config())
+    check(watch, CREEPS, REST, 10.0)
+    told = {check(watch, CREEPS, REST, 10.0 + HOLD_S + 0.1 * step) for step in range(1, 600)}
     assert told == {f"{CREEPS.drive.joint} is ordered 0.0010 m/s for {HOLD_S:.3f} s"}
 
 
@@ -49,48 +49,48 @@ def test_what_it_tells_does_not_grow_while_nobody_hears_the_drive_any_more() -> 
     "bounds", [Bounds(-0.01, 0, 0, 0), Bounds(0, 0.01, 0, 0), Bounds(0, 0, -0.1, 0), Bounds(0, 0, 0, 0.1)]
 )
 def test_as_soon_as_anything_is_allowed_it_begins_anew(bounds: Bounds) -> None:
-    watch = CreepWatch(config())
-    look(watch, CREEPS, REST, 10.0)
-    assert look(watch, CREEPS, bounds, 11.0) == ""
-    assert look(watch, CREEPS, REST, 11.01) == ""
-    assert look(watch, CREEPS, REST, 11.0 + HOLD_S) == ""
-    assert look(watch, CREEPS, REST, 11.011 + HOLD_S) != ""
+    watch = SetpointAtRestWatch(config())
+    check(watch, CREEPS, REST, 10.0)
+    assert check(watch, CREEPS, bounds, 11.0) == ""
+    assert check(watch, CREEPS, REST, 11.01) == ""
+    assert check(watch, CREEPS, REST, 11.0 + HOLD_S) == ""
+    assert check(watch, CREEPS, REST, 11.011 + HOLD_S) != ""
 
 
 # 10 s it creeps ── 10.25 s a moment is allowed ── the whole hold again, from 10.28125 s on
 def test_a_moment_that_is_allowed_gives_the_whole_hold_again() -> None:
-    watch = CreepWatch(replace(config(), order_hold_s=0.375))
-    told = [look(watch, CREEPS, Bounds(0.0, 0.01, 0.0, 0.0) if n == 8 else REST, 10.0 + n / 32) for n in range(22)]
+    watch = SetpointAtRestWatch(replace(config(), order_hold_s=0.375))
+    told = [check(watch, CREEPS, Bounds(0.0, 0.01, 0.0, 0.0) if n == 8 else REST, 10.0 + n / 32) for n in range(22)]
     assert [n for n, why in enumerate(told) if why] == [21]
 
 
 # 10 s to 10.25 s it creeps ── rests for exactly the hold ── 10.625 s it creeps: the whole hold again
 @pytest.mark.parametrize(("rest", "found_after"), [(12, 12), (11, 4)])
 def test_a_rest_as_long_as_the_hold_ends_it_and_a_shorter_one_does_not(rest: int, found_after: int) -> None:
-    watch = CreepWatch(replace(config(), order_hold_s=0.375))
-    told = [look(watch, CREEPS if n <= 8 or n >= 8 + rest else AT_REST, REST, 10.0 + n / 32) for n in range(40)]
+    watch = SetpointAtRestWatch(replace(config(), order_hold_s=0.375))
+    told = [check(watch, CREEPS if n <= 8 or n >= 8 + rest else AT_REST, REST, 10.0 + n / 32) for n in range(40)]
     assert next(n for n, why in enumerate(told) if why) == 8 + rest + found_after
 
 
 @pytest.mark.parametrize("changes", [{"target_mps": 0.0}, {"state": DriveState.SWITCHED_ON}, {"state": None}])
 def test_a_zero_and_a_drive_without_power_are_no_order(changes: dict[str, object]) -> None:
-    watch = CreepWatch(config())
-    look(watch, CREEPS, REST, 10.0)
-    assert look(watch, replace(CREEPS, **changes), REST, 11.0) == ""  # type: ignore[arg-type]
-    assert look(watch, CREEPS, REST, 11.01) == ""
+    watch = SetpointAtRestWatch(config())
+    check(watch, CREEPS, REST, 10.0)
+    assert check(watch, replace(CREEPS, **changes), REST, 11.0) == ""  # type: ignore[arg-type]
+    assert check(watch, CREEPS, REST, 11.01) == ""
 
 
 def test_a_zero_now_and_then_ends_nothing_and_one_that_lasts_does() -> None:
-    watch = CreepWatch(config())
-    told = [look(watch, AT_REST if n % 5 == 0 else CREEPS, REST, 10.0 + n / 64) for n in range(45)]
+    watch = SetpointAtRestWatch(config())
+    told = [check(watch, AT_REST if n % 5 == 0 else CREEPS, REST, 10.0 + n / 64) for n in range(45)]
     assert told[0] == told[33] == ""
     assert told[-1] != ""
-    assert look(watch, AT_REST, REST, 10.0 + 45 / 64 + HOLD_S) == ""
-    assert look(watch, CREEPS, REST, 10.8 + HOLD_S) == ""
+    assert check(watch, AT_REST, REST, 10.0 + 45 / 64 + HOLD_S) == ""
+    assert check(watch, CREEPS, REST, 10.8 + HOLD_S) == ""
 
 
 def test_it_is_a_setpoint_outside_of_the_leases() -> None:
-    verdict = decide(well(creep="left is ordered 0.0280 m/s for 0.400 s"), CONFIG, NOW)
+    verdict = decide(well(setpoint_at_rest="left is ordered 0.0280 m/s for 0.400 s"), CONFIG, NOW)
     assert verdict.cause is TripCause.TARGET_OUTSIDE
     assert verdict.detail == "left is ordered 0.0280 m/s for 0.400 s, while the leases allow no motion"
 

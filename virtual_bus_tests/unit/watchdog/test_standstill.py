@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from canbase_watchdog.standing import GAP_S, STILL_S, StandWatch
+from canbase_watchdog.standstill import GAP_S, STILL_S, StandstillWatch
 from canbase_watchdog.watchdog import State
 from support.watchdog_story import FakeDrive, Story, config
 
@@ -23,7 +23,7 @@ CYCLE_S = 0.01
 class Wheel:
     now_s: float = 100.0
     at_m: float = 0.0
-    watch: StandWatch = field(default_factory=lambda: StandWatch(CONFIG.drives[0], CONFIG))
+    watch: StandstillWatch = field(default_factory=lambda: StandstillWatch(CONFIG.drives[0], CONFIG))
 
     def turns(self, seconds: float, encoder_mps: float, velocity_mps: float, noise_mps: float = 0.0) -> bool:
         noise = random.Random(1)
@@ -195,10 +195,10 @@ def test_after_a_trip_a_wheel_with_noise_settles_and_can_be_reset() -> None:
 # --- the limits, in binary fractions: a rim slower than 1/128 m/s stands, up to 1/16 m/s is noise
 
 
-def exact(m_per_count: float = 2.0**-9) -> StandWatch:
+def exact(m_per_count: float = 2.0**-9) -> StandstillWatch:
     """One count is 2 mm, two of them are near: 4 mm."""
     drive = replace(CONFIG.drives[0], m_per_count=m_per_count)
-    return StandWatch(drive, replace(CONFIG, standstill_mps=2.0**-7, motion_tolerance_mps=2.0**-4))
+    return StandstillWatch(drive, replace(CONFIG, standstill_mps=2.0**-7, motion_tolerance_mps=2.0**-4))
 
 
 @pytest.mark.parametrize(("counts", "stands"), [(384, True), (-384, True), (385, False), (-385, False)])

@@ -8,7 +8,7 @@ import pytest
 
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.pair import PairWatch
+from canbase_watchdog.left_right import LeftRightWatch
 from canbase_watchdog.view import Axis, BusView
 from support.watchdog_story import config
 
@@ -28,9 +28,9 @@ def bus(left: float, right: float, sync_at: float, **changes: object) -> BusView
 
 
 def twice(left: float, right: float, **changes: object) -> str:
-    pair = PairWatch(CONFIG)
-    assert pair.look(bus(left, right, 1.0, **changes), ARC) == ""
-    return pair.look(bus(left, right, 1.01, **changes), ARC)
+    watch = LeftRightWatch(CONFIG)
+    assert watch.check_setpoints(bus(left, right, 1.0, **changes), ARC) == ""
+    return watch.check_setpoints(bus(left, right, 1.01, **changes), ARC)
 
 
 @pytest.mark.parametrize(
@@ -58,20 +58,20 @@ def test_the_sentence_is_that_of_the_bounds() -> None:
 
 
 def test_looking_twice_at_one_sync_is_looking_once() -> None:
-    pair = PairWatch(CONFIG)
+    watch = LeftRightWatch(CONFIG)
     view = bus(-0.2, 0.6, 1.0)
-    assert [pair.look(view, ARC) for _ in range(5)] == [""] * 5
+    assert [watch.check_setpoints(view, ARC) for _ in range(5)] == [""] * 5
 
 
 def test_one_bad_sync_between_good_ones_is_a_lost_frame() -> None:
-    pair = PairWatch(CONFIG)
+    watch = LeftRightWatch(CONFIG)
     speeds = ((-0.2, 0.6), (0.2, 0.6)) * 3
-    assert [pair.look(bus(*speed, n / 100), ARC) for n, speed in enumerate(speeds)] == [""] * 6
+    assert [watch.check_setpoints(bus(*speed, n / 100), ARC) for n, speed in enumerate(speeds)] == [""] * 6
 
 
 def test_it_is_told_for_each_further_sync() -> None:
-    pair = PairWatch(CONFIG)
-    assert [pair.look(bus(-0.2, 0.6, n / 100), ARC) != "" for n in range(4)] == [False, True, True, True]
+    watch = LeftRightWatch(CONFIG)
+    assert [watch.check_setpoints(bus(-0.2, 0.6, n / 100), ARC) != "" for n in range(4)] == [False, True, True, True]
 
 
 @pytest.mark.parametrize(
@@ -83,37 +83,37 @@ def test_setpoints_that_are_old_or_without_effect_say_nothing(changes: dict[str,
 
 
 def test_one_axis_without_a_new_setpoint_is_enough_to_say_nothing() -> None:
-    pair = PairWatch(CONFIG)
+    watch = LeftRightWatch(CONFIG)
     for n in range(3):
         view = bus(-0.2, 0.6, n / 100)
         left, right = view.axes
         stale = replace(view, axes=(left, replace(right, setpoint_at=-1.0)))
-        assert pair.look(stale, ARC) == ""
+        assert watch.check_setpoints(stale, ARC) == ""
 
 
 def test_a_sync_without_a_setpoint_shows_nothing_and_forgets_nothing() -> None:
     """An axis that gets its setpoint for every second SYNC only."""
-    pair = PairWatch(CONFIG)
+    watch = LeftRightWatch(CONFIG)
     found = []
     for n in range(6):
         view = bus(-0.2, 0.6, n / 100)
         left, right = view.axes
         stale = replace(view, axes=(left, replace(right, setpoint_at=-1.0)))
-        found.append(pair.look(view if n % 2 == 0 else stale, ARC) != "")
+        found.append(watch.check_setpoints(view if n % 2 == 0 else stale, ARC) != "")
     assert found == [False, False, True, False, True, False]
 
 
 def test_drives_that_were_not_enabled_begin_anew() -> None:
-    pair = PairWatch(CONFIG)
-    assert pair.look(bus(-0.2, 0.6, 1.0), ARC) == ""
-    assert pair.look(bus(-0.2, 0.6, 1.01, state=DriveState.SWITCHED_ON), ARC) == ""
-    assert pair.look(bus(-0.2, 0.6, 1.02), ARC) == ""
-    assert pair.look(bus(-0.2, 0.6, 1.03), ARC) != ""
+    watch = LeftRightWatch(CONFIG)
+    assert watch.check_setpoints(bus(-0.2, 0.6, 1.0), ARC) == ""
+    assert watch.check_setpoints(bus(-0.2, 0.6, 1.01, state=DriveState.SWITCHED_ON), ARC) == ""
+    assert watch.check_setpoints(bus(-0.2, 0.6, 1.02), ARC) == ""
+    assert watch.check_setpoints(bus(-0.2, 0.6, 1.03), ARC) != ""
 
 
 def test_every_wheel_of_one_side_goes_together_with_every_one_of_the_other() -> None:
     four = config((1, 0), (2, 0), (3, 0), (4, 0))  # left, right, left, right
-    pair = PairWatch(four)
+    watch = LeftRightWatch(four)
     found = []
     for n in range(2):
         speeds = (0.2, 0.6, 0.2, -0.2)
@@ -121,16 +121,16 @@ def test_every_wheel_of_one_side_goes_together_with_every_one_of_the_other() -> 
             Axis(d, state=ENABLED, setpoint_mps=s, setpoint_at=n / 100)
             for d, s in zip(four.drives, speeds, strict=True)
         ]
-        found.append(pair.look(BusView(tuple(axes), (), sync_at=n / 100), ARC))
+        found.append(watch.check_setpoints(BusView(tuple(axes), (), sync_at=n / 100), ARC))
     assert found == ["", "-1.000 rad/s together, allowed 0.000 to 1.000 rad/s"]
 
 
 def test_a_coarse_drive_widens_the_tolerance() -> None:
     coarse = replace(CONFIG, drives=(replace(CONFIG.drives[0], mps_per_bit=-0.021), CONFIG.drives[1]))
-    pair = PairWatch(coarse)
+    watch = LeftRightWatch(coarse)
     beyond = 0.4 + TOLERANCE_MPS + 0.0199
-    assert [pair.look(bus(beyond, beyond, n / 100), ARC) for n in range(3)] == [""] * 3
-    assert [pair.look(bus(beyond + 2e-4, beyond + 2e-4, n / 100), ARC) != "" for n in range(3, 6)] == [
+    assert [watch.check_setpoints(bus(beyond, beyond, n / 100), ARC) for n in range(3)] == [""] * 3
+    assert [watch.check_setpoints(bus(beyond + 2e-4, beyond + 2e-4, n / 100), ARC) != "" for n in range(3, 6)] == [
         False,
         True,
         True,

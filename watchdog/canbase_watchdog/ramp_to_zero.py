@@ -44,7 +44,7 @@ class _Ramp:
         return 1.0 - gained_mps / self.linear_mps
 
 
-class HaltWatch:
+class RampToZeroWatch:
     """Remembers since when zero is leased, and what was ordered when nothing else could be under way any more."""
 
     def __init__(self, config: WatchdogConfig) -> None:
@@ -57,7 +57,7 @@ class HaltWatch:
         self._after_s = 0.0
         self._bad = 0
 
-    def look(self, bus: BusView, lease: Lease | None, now_s: float, hard_since: float = math.inf) -> str:
+    def check_setpoints(self, bus: BusView, lease: Lease | None, now_s: float, hard_since: float = math.inf) -> str:
         """Which wheel's setpoint does not fall, for two SYNCs in a row, in words; empty: they do.
 
         `hard_since`: when "brakes hard" was received [s], infinity while it does not hold.

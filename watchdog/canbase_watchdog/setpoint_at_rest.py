@@ -17,23 +17,23 @@ AT_REST = Bounds(0.0, 0.0, 0.0, 0.0)
 """Nothing may move."""
 
 
-class CreepWatch:
+class SetpointAtRestWatch:
     """Remembers for how long a wheel was ordered to turn and nothing allowed it; a zero in between ends nothing."""
 
     def __init__(self, config: WatchdogConfig) -> None:
         """`order_hold_s` from `config`: the longest way of an order to the driver, and its ramp's rounding."""
         self._hold_s = config.order_hold_s
         self._ordered_s = 0.0
-        self._ordered_at = self._looked_at = math.inf
+        self._ordered_at = self._checked_at = math.inf
         self._ordered = False
         """At the last look."""
 
-    def look(self, bus: BusView, bounds: Bounds, now_s: float) -> str:
+    def check_setpoints(self, bus: BusView, bounds: Bounds, now_s: float) -> str:
         """What is ordered though nothing is allowed, for `order_hold_s` in all; empty: nothing is.
 
         It starts again when anything is allowed, and when nothing was ordered for as long.
         """
-        elapsed_s, self._looked_at = now_s - self._looked_at, now_s
+        elapsed_s, self._checked_at = now_s - self._checked_at, now_s
         if bounds != AT_REST:
             self._ordered, self._ordered_s = False, 0.0
             return ""

@@ -34,7 +34,7 @@ JUMP_FACTOR = 3.0
 """A step beyond this many times the fastest wheel's is no travel."""
 
 
-class StandWatch:
+class StandstillWatch:
     """Follows one axis. Speeds and travel at the rim [m/s, m]."""
 
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:

@@ -6,7 +6,7 @@ FORGIVEN = 0.5
 """A good cycle takes back so much of a bad one: one bad cycle in two adds up, one in three does not."""
 
 
-class Tally:
+class BadCycles:
     """Bad cycles, less half of the good ones; never below 0."""
 
     def __init__(self) -> None:

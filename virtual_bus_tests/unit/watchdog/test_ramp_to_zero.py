@@ -16,9 +16,9 @@ import pytest
 from canbase_config.robot import Robot
 from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
-from canbase_watchdog.halt import RECEIVED_S, HaltWatch
 from canbase_watchdog.lease import Lease
 from canbase_watchdog.policy import decide
+from canbase_watchdog.ramp_to_zero import RECEIVED_S, RampToZeroWatch
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.view import BusView
 from canbase_watchdog.watchdog import State
@@ -42,9 +42,9 @@ def found_s(
     wheels: Callable[[float], tuple[float, float]], jerk: float, longest_s: float = 20.0, **changes: object
 ) -> float:
     """Seconds since zero was leased until it is found that the setpoints, by time since then, do not fall."""
-    watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=jerk, **changes))  # type: ignore[arg-type]
+    watch = RampToZeroWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=jerk, **changes))  # type: ignore[arg-type]
     for i in range(round(longest_s / CYCLE_S)):
-        if watch.look(bus(wheels(i * CYCLE_S), 5.0 + i * CYCLE_S), ZERO, 5.0 + i * CYCLE_S):
+        if watch.check_setpoints(bus(wheels(i * CYCLE_S), 5.0 + i * CYCLE_S), ZERO, 5.0 + i * CYCLE_S):
             return i * CYCLE_S
     return inf
 
@@ -79,36 +79,38 @@ def test_one_wheel_is_enough() -> None:
 
 
 def test_it_takes_two_syncs_and_a_sync_without_setpoints_shows_nothing() -> None:
-    watch = HaltWatch(replace(config(), order_wait_s=0.0, jerk_mps3=100.0))
-    watch.look(bus((0.8, 0.8), 5.0), ZERO, 5.0)
+    watch = RampToZeroWatch(replace(config(), order_wait_s=0.0, jerk_mps3=100.0))
+    watch.check_setpoints(bus((0.8, 0.8), 5.0), ZERO, 5.0)
     told = []
     for i in range(1, 40):
         at = 5.0 + i / 100
-        told.append(bool(watch.look(bus((0.8, 0.8), at, came=i != 30), ZERO, at)))
-        assert watch.look(bus((0.8, 0.8), at), ZERO, at + 0.005) == ""  # the same SYNC
+        told.append(bool(watch.check_setpoints(bus((0.8, 0.8), at, came=i != 30), ZERO, at)))
+        assert watch.check_setpoints(bus((0.8, 0.8), at), ZERO, at + 0.005) == ""  # the same SYNC
     assert told.index(True) in (14, 15)  # 0.1 s, 0.031 m/s of 1 m/s², and one SYNC more
     assert [told[28], told[29], told[30]] == [True, False, True]
 
 
 def test_a_new_order_and_a_missing_lease_begin_anew() -> None:
     for lease in (MOVE, None):
-        watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=100.0))
+        watch = RampToZeroWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=100.0))
         for i in range(400):
             at = 5.0 + i / 100
-            assert watch.look(bus((0.8, 0.8), at), lease if i % 40 == 0 else ZERO, at) == ""
+            assert watch.check_setpoints(bus((0.8, 0.8), at), lease if i % 40 == 0 else ZERO, at) == ""
 
 
 def test_a_drive_that_is_not_enabled_is_ordered_nothing() -> None:
-    watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=100.0))
-    assert {watch.look(bus((0.8, 0.8), 5.0 + i / 100, enabled=False), ZERO, 5.0 + i / 100) for i in range(300)} == {""}
+    watch = RampToZeroWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=100.0))
+    assert {
+        watch.check_setpoints(bus((0.8, 0.8), 5.0 + i / 100, enabled=False), ZERO, 5.0 + i / 100) for i in range(300)
+    } == {""}
 
 
 def test_a_driver_that_was_late_goes_on_with_its_ramp_from_where_it_was() -> None:
     """Its cycle stood still for 0.25 s: the limiter counts 0.1 s of it."""
-    watch = HaltWatch(replace(config(), order_wait_s=0.0, jerk_mps3=1000.0))
+    watch = RampToZeroWatch(replace(config(), order_wait_s=0.0, jerk_mps3=1000.0))
     speed, at = 0.8, 5.0
     while speed > 0.0:
-        assert watch.look(bus((speed, speed), at), ZERO, at) == ""
+        assert watch.check_setpoints(bus((speed, speed), at), ZERO, at) == ""
         late = 5.3 < at < 5.31
         at += 0.25 if late else 0.01
         speed -= 0.1 if late else 0.01
@@ -121,7 +123,7 @@ def test_the_drivers_own_limiter_is_never_found(seed: int) -> None:
     limits, track_m = some_limits(random), random.choice((0.2, 0.5, 1.0))
     limits = limits.model_copy(update={"jerk_mps3": random.choice((0.1, 0.5, 2.0, 10.0, 1000.0))})
     told = limits.model_dump(exclude={"emergency_deceleration_mps2"}) | {"track_m": track_m}
-    watch = HaltWatch(replace(config(), **told, order_wait_s=WAIT_S))
+    watch = RampToZeroWatch(replace(config(), **told, order_wait_s=WAIT_S))
     limiter, motion = Limiter(limits, track_m), MotionState.AT_REST
     for _ in range(6):
         order = Twist2D(
@@ -138,7 +140,7 @@ def test_the_drivers_own_limiter_is_never_found(seed: int) -> None:
         at, motion = at + cycle_s, limiter.step(motion, target, cycle_s)
         speeds = wheel_speeds(motion.twist, track_m)
         received = at + random.choice((0.0, 0.0, 0.09))
-        assert watch.look(bus(speeds, max(received, watch._sync_at + 1e-6)), ZERO, received) == ""
+        assert watch.check_setpoints(bus(speeds, max(received, watch._sync_at + 1e-6)), ZERO, received) == ""
         if at > 30.0:
             break
 
@@ -148,11 +150,11 @@ def test_the_drivers_own_limiter_is_never_found(seed: int) -> None:
 
 def hard_found_s(wheels: Callable[[float], tuple[float, float]], lease: Lease = ZERO, before_s: float = 0.0) -> float:
     """As found_s, by seconds since "brakes hard"; zero was leased for `before_s` before."""
-    watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=1.0, emergency_wait_s=0.12))
+    watch = RampToZeroWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=1.0, emergency_wait_s=0.12))
     begin = round(before_s / CYCLE_S)
     for i in range(-begin, 200):
         at = 5.0 + i * CYCLE_S
-        if watch.look(bus(wheels(i * CYCLE_S), at), ZERO if i < 0 else lease, at, 5.0 if i >= 0 else inf):
+        if watch.check_setpoints(bus(wheels(i * CYCLE_S), at), ZERO if i < 0 else lease, at, 5.0 if i >= 0 else inf):
             return i * CYCLE_S
     return inf
 
@@ -182,15 +184,15 @@ def test_zero_that_was_leased_before_makes_no_ramp_of_brakes_hard() -> None:
 
 
 def test_the_end_of_brakes_hard_begins_anew() -> None:
-    watch = HaltWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=1000.0, emergency_wait_s=0.0))
+    watch = RampToZeroWatch(replace(config(), order_wait_s=WAIT_S, jerk_mps3=1000.0, emergency_wait_s=0.0))
     for i in range(5):
-        watch.look(bus((0.0, 0.0), 5.0 + i / 100), ZERO, 5.0 + i / 100, 5.0)
+        watch.check_setpoints(bus((0.0, 0.0), 5.0 + i / 100), ZERO, 5.0 + i / 100, 5.0)
     for i in range(5, 100):
-        assert watch.look(bus((0.3, 0.3), 5.0 + i / 100), MOVE, 5.0 + i / 100) == ""
+        assert watch.check_setpoints(bus((0.3, 0.3), 5.0 + i / 100), MOVE, 5.0 + i / 100) == ""
 
 
 def test_the_policy_trips_with_it() -> None:
-    view = replace(well(), halt="left is ordered 0.8 m/s")
+    view = replace(well(), ramp_to_zero="left is ordered 0.8 m/s")
     verdict = decide(view, CONFIG, NOW)
     assert (verdict.cause, verdict.detail) == (TripCause.TARGET_OUTSIDE, "left is ordered 0.8 m/s")
 

@@ -36,13 +36,13 @@ LONGEST_STEP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Push:
+class TorqueEvidence:
     """The torque of a drive on a wheel that shows no motion. `share`: of the rated one; None: it is not reported."""
 
     share: float | None = None
     pushed_s: float = 0.0
     """Rule 1: time at rated torque that gives the same impulse."""
-    owes: bool = False
+    release_due: bool = False
     """It was ordered motion, and has not released the wheel since."""
     overdue_s: float = 0.0
     """It has pushed enough, nothing is ordered, and it has had power for this long since then; at once where it was
@@ -51,7 +51,7 @@ class Push:
     """Rule 2."""
 
 
-class PushWatch:
+class TorqueWatch:
     """Follows one axis. What is ordered counts from the SYNC that made it effective."""
 
     def __init__(self, drive: WatchedDrive, config: WatchdogConfig) -> None:
@@ -61,20 +61,20 @@ class PushWatch:
         self._counts: int | None = None
         self._counts_before: int | None = None
         self._at = math.inf
-        self._tells = self._rests = False
+        self._reports_torque = self._rests = False
         self._setpoint_mps = self._asked_m = 0.0
         """What was ordered while it was strained, since its last sign of life; infinity: it was released since."""
         self._unasked = UnaskedTorque(drive.m_per_count, config.stand_impulse_s)
         self._usual = 0.0
         """Torque at the last sign of life, of the rated one; or that which held the wheel when motion was ordered first
         since its last release."""
-        self.last = Push()
+        self.last = TorqueEvidence()
 
     def on_sync(self, setpoint_mps: float, rests: bool) -> None:
         """The setpoint of this wheel; `rests`: those of all wheels are zero, and none moves by what it measures."""
         self._rests, self._setpoint_mps = rests, setpoint_mps
-        if setpoint_mps != 0.0 and not self.last.owes:
-            self.last = replace(self.last, owes=True)
+        if setpoint_mps != 0.0 and not self.last.release_due:
+            self.last = replace(self.last, release_due=True)
 
     def on_position(self, counts: int) -> None:
         """6064h of a status TPDO; the velocity of the same SYNC follows."""
@@ -83,10 +83,10 @@ class PushWatch:
     def trust(self) -> None:
         """A reset was accepted: everything starts again."""
         self._unasked.trust()
-        self.last = Push()
+        self.last = TorqueEvidence()
 
     @property
-    def lies(self) -> bool:
+    def contradicts_encoder(self) -> bool:
         """What the encoder reports is no evidence any more."""
         return self.overdue or self.in_vain
 
@@ -103,39 +103,39 @@ class PushWatch:
     def on_sample(self, share: float | None, powered: bool, now_s: float) -> None:
         """A velocity TPDO with the torque in it, None: none."""
         elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_STEP_S), now_s
-        self._tells = self._tells or bool(share)
-        known = share if self._tells else None
+        self._reports_torque = self._reports_torque or bool(share)
+        known = share if self._reports_torque else None
         step_m = self._step_m()
-        lives = self._life.on_step(step_m)
+        encoder_moves = self._life.on_step(step_m)
         self._unasked.on_step(step_m)
-        vain_s = 0.0 if lives else self.last.vain_s
-        if lives:
+        vain_s = 0.0 if encoder_moves else self.last.vain_s
+        if encoder_moves:
             self._asked_m = 0.0
         if not powered:
             self._unasked.release()
-            self._usual, self._asked_m = 0.0, 0.0 if lives else math.inf
-            self.last = Push(known, vain_s=min(vain_s, KEPT_SHARE * self._config.motion_missing_s))
+            self._usual, self._asked_m = 0.0, 0.0 if encoder_moves else math.inf
+            self.last = TorqueEvidence(known, vain_s=min(vain_s, KEPT_SHARE * self._config.motion_missing_s))
             return
-        if lives or not self.last.owes:
+        if encoder_moves or not self.last.release_due:
             self._usual = known or 0.0
-        rests = self._rests and not self.last.owes and self._config.stand_proof
+        rests = self._rests and not self.last.release_due and self._config.stand_proof
         self._unasked.on_torque(known, rests, elapsed_s)
-        self.last = self._with_power(known, elapsed_s, lives, vain_s)
+        self.last = self._with_power(known, elapsed_s, encoder_moves, vain_s)
 
-    def _with_power(self, share: float | None, elapsed_s: float, lives: bool, vain_s: float) -> Push:
-        config, owes = self._config, self.last.owes
+    def _with_power(self, share: float | None, elapsed_s: float, encoder_moves: bool, vain_s: float) -> TorqueEvidence:
+        config, release_due = self._config, self.last.release_due
         torque = 1.0 if share is None else abs(share)
         given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
-        pushed_s = 0.0 if lives else min(self.last.pushed_s + given_s, config.stand_impulse_s)
-        overdue = owes and self._rests and config.stand_proof and pushed_s >= config.stand_impulse_s
+        pushed_s = 0.0 if encoder_moves else min(self.last.pushed_s + given_s, config.stand_impulse_s)
+        overdue = release_due and self._rests and config.stand_proof and pushed_s >= config.stand_impulse_s
         overdue_s = self.last.overdue_s + elapsed_s if overdue or self._unasked.is_due else 0.0
         overdue_s = config.stand_answer_s if self._unasked.is_dead else min(overdue_s, config.stand_answer_s)
-        strain = min(torque, abs(share - self._usual), 1.0) if owes and share is not None else 0.0
+        strain = min(torque, abs(share - self._usual), 1.0) if release_due and share is not None else 0.0
         if strain > STRAIN_SHARE and torque > abs(self._usual) + ALIKE_SHARE:
             self._asked_m += abs(self._setpoint_mps) * elapsed_s
             weight = strain if self._asked_m < config.motion_missing_m else 1.0
             vain_s = min(vain_s + weight * elapsed_s, config.motion_missing_s)
-        return Push(share, pushed_s, owes, overdue_s, vain_s)
+        return TorqueEvidence(share, pushed_s, release_due, overdue_s, vain_s)
 
     def _step_m(self) -> float:
         """Travel of the encoder since the last sample."""
