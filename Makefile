@@ -190,9 +190,10 @@ docs: $(VENV)/ready ## the documentation as a site in build/site, without networ
 	@echo "open build/site/index.html"
 
 .PHONY: lint
-lint: $(VENV)/ready ## ruff, mypy, import rules, and that colcon sees a ROS 2 package
+lint: $(VENV)/ready ## ruff, oxlint (JavaScript), mypy, import rules, and that colcon sees a ROS 2 package
 	ruff check .
 	ruff format --check .
+	oxlint --deny-warnings .
 	mypy
 	lint-imports --no-logo
 	@found=$$(colcon --log-base /dev/null list); echo "$$found"; [[ $$found == *"(ros.ament_cmake)" ]]

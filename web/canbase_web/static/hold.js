@@ -1,7 +1,8 @@
 // Hold-to-drive and the large stop. Every way in which a finger, a page or a browser goes ends the orders:
 // the server counts an order only while it echoes a number that is younger than 0.2 s.
-const canbaseHold = (() => {
-  let socket = null, newest = 0, press = 0, forward = 0, turn = 0, held = false, keys = new Set(), share = 0.2;
+window.canbaseHold = (() => {
+  let socket = null, newest = 0, press = 0, forward = 0, turn = 0, held = false, share = 0.2;
+  const keys = new Set();
   const KEYS = {ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1]};
   const say = text => { const e = document.getElementById("hold-state"); if (e && e.textContent !== text) e.textContent = text; };
   const send = () => {

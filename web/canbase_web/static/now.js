@@ -1,5 +1,5 @@
 // The page `Now`: the server sends numbers 20 times a second and words 5 times; what the plots keep stays in the browser.
-const canbaseNow = (() => {
+window.canbaseNow = (() => {
   const KEEP_S = 20, series = {};
   const text = (id, value) => { const e = document.getElementById(id); if (e && e.textContent !== value) e.textContent = value; };
   const row = cells => { const tr = document.createElement("tr"); cells.forEach(c => { const td = document.createElement("td"); td.textContent = c; tr.append(td); }); return tr; };
