@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from canbase_cli.explain import ChannelOfFile, RecordingConfig, recorded_robot
-from canbase_cli.options import ros_needed
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
 EPILOG: Final = "For example: canbase record export stop.asc --config robot.yaml --mcap stop.mcap"
@@ -25,30 +24,27 @@ def export(
     """Write a recording as an MCAP file of ROS messages, which Foxglove and PlotJuggler open.
 
     It has joint_states (measured) and joint_states_ordered, cmd_vel, the log, and each frame (can_msgs/Frame).
-    Without a robot.yaml the joints are called after their nodes, in topics that end in _raw. It needs ROS 2, as canbase
-    does, and Foxglove's library. `canbase explain` reads the file again.
+    Without a robot.yaml the joints are called after their nodes, in topics that end in _raw. It needs
+    Foxglove's library, and no ROS. `canbase explain` reads the file again.
 
     Exit codes: 0 written, 1 nothing in the file can be read or the MCAP file is not complete, 2 wrong command line or
     robot.yaml.
     """
     robot, _ = recorded_robot(recording, config)
-    with ros_needed():
-        try:
-            from canbase_recording.mcap_export import export as write
-        except ModuleNotFoundError as error:
-            if error.name != "mcap":
-                raise
-            fail("canbase record export needs the Python package mcap: pip install 'mcap>=1.2,<2'", WRONG_INPUT)
+    try:
+        from canbase_recording.mcap_export import export as write
+    except ModuleNotFoundError as error:
+        fail(f"this needs the Python package {error.name}: pip install 'mcap-ros2-support>=0.5,<1'", WRONG_INPUT)
     from canbase_recording.recording_file import NoRecordingError
 
     try:
-        read, file, problem = write(recording, mcap, robot, channel)
+        read, written = write(recording, mcap, robot, channel)
     except NoRecordingError as error:
         fail(str(error), FAILED)
-    except OSError as error:
+    except (FileExistsError, FileNotFoundError, NotADirectoryError, PermissionError) as error:
         fail(f"{mcap} cannot be written: {error.strerror}", WRONG_INPUT)
+    except OSError as error:
+        fail(f"{mcap} is not complete: {error.strerror or error}", FAILED)
     for sentence in read.problems.sentences:
         warn(sentence)
-    if problem:
-        fail(f"{mcap} is not complete: {problem}", FAILED)
-    typer.echo(f"{mcap}: {read.frames} frames, {file.messages} messages of {file.topics} topics", err=True)
+    typer.echo(f"{mcap}: {read.frames} frames, {written.total()} messages of {len(written)} topics", err=True)

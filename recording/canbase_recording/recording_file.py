@@ -206,8 +206,8 @@ class RecordingFile:
 
     def _foreign(self) -> Iterator[can.Message | Note]:
         """By a library in a process of its own. What follows a broken container cannot be found again."""
-        if self.format == "MCAP" and find_spec("mcap") is None:
-            self.problems.truncated = "MCAP needs the Python package mcap: pip install 'mcap>=1.2,<2'"
+        if self.format == "MCAP" and find_spec("mcap_ros2") is None:
+            self.problems.truncated = "MCAP needs a Python package: pip install 'mcap-ros2-support>=0.5,<1'"
             return
         for message in foreign_reader.messages(self.format, self._file, self.size, self.problems):
             if isinstance(message, int):
