@@ -45,6 +45,8 @@ _PYTHON: Final = "@PYTHON@"
 HARDENING: Final = "canbase-hardening.conf"
 """The sandbox of all parts: one file, a drop-in of each of their units. In `canbase-.service.d` it would be one of the
 integrator's own units too, whatever they need."""
+COMMON: Final = "canbase-common.conf"
+"""What the four parts have in common beside it, likewise."""
 ONLINE: Final = "network-online.target"
 """DDS looks at the network interfaces as a node starts, and uses no other ones."""
 
@@ -256,11 +258,9 @@ def _check_places(request: Request, manifests: Mapping[str, str]) -> None:
 
 def _files(request: Request) -> list[WriteFile | Link]:
     return [
-        *(
-            Link(UNITS / f"canbase-{part}@.service.d" / "00-hardening.conf", f"../{HARDENING}")
-            for part in (*PARTS, METRICS)
-        ),
-        *(_unit(name, text, request.python) for name, text in sorted(request.templates.items(), key=_hardening_first)),
+        *(_shared(part, HARDENING) for part in (*PARTS, METRICS)),
+        *(_shared(part, COMMON) for part in PARTS),
+        *(_unit(name, text, request.python) for name, text in sorted(request.templates.items(), key=_drop_ins_first)),
         MODES,
         *_of_the_owner(request),
         *_can(request),
@@ -269,9 +269,13 @@ def _files(request: Request) -> list[WriteFile | Link]:
     ]
 
 
-def _hardening_first(template: tuple[str, str]) -> tuple[bool, str]:
+def _shared(part: str, file: str) -> Link:
+    return Link(UNITS / f"canbase-{part}@.service.d" / file.replace("canbase", "00"), f"../{file}")
+
+
+def _drop_ins_first(template: tuple[str, str]) -> tuple[bool, str]:
     """An installation that is cut off leaves no unit without its sandbox."""
-    return template[0] != HARDENING, template[0]
+    return template[0] not in (HARDENING, COMMON), template[0]
 
 
 def _unit(name: str, text: str, python: str) -> WriteFile:

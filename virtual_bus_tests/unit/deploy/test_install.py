@@ -13,7 +13,7 @@ from canbase_deploy.actions import Existing, Link, Remove, Run, WriteFile
 from canbase_deploy.host import manifests
 from canbase_deploy.keystore import SERVICES
 from canbase_deploy.neighbours import Neighbour
-from canbase_deploy.plan import HARDENING, METRICS, PARTS, InstallError, Request, install_plan, left_interfaces
+from canbase_deploy.plan import COMMON, HARDENING, METRICS, PARTS, InstallError, Request, install_plan, left_interfaces
 from support.install_plans import EXAMPLE, TEMPLATES, UNITS, carried_out, changed, on_bus, request, texts
 
 
@@ -27,28 +27,32 @@ def test_no_placeholder_is_left_in_a_unit() -> None:
 def test_a_robot_starts_at_boot_and_its_interface_with_the_adapter() -> None:
     links = {str(action.path) for action in install_plan(request(), {}) if isinstance(action, Link)}
 
-    assert links - hardening_links() == {
+    assert links - shared_links() == {
         f"{UNITS}/multi-user.target.wants/canbase@example.target",
         f"{UNITS}/sys-subsystem-net-devices-can0.device.wants/canbase-can@can0.service",
     }
 
 
-def hardening_links() -> set[str]:
-    return {f"{UNITS}/canbase-{part}@.service.d/00-hardening.conf" for part in (*PARTS, METRICS)}
+def shared_links() -> set[str]:
+    hardening = {f"{UNITS}/canbase-{part}@.service.d/00-hardening.conf" for part in (*PARTS, METRICS)}
+    return hardening | {f"{UNITS}/canbase-{part}@.service.d/00-common.conf" for part in PARTS}
 
 
-def test_every_part_has_the_one_sandbox_before_it_has_a_unit(tmp_path: Path) -> None:
+def test_every_part_has_the_one_sandbox_and_what_is_common_before_it_has_a_unit(tmp_path: Path) -> None:
     plan = install_plan(request(), {})
     paths = [str(action.path) for action in plan if isinstance(action, WriteFile | Link)]
-    links = [place for place, path in enumerate(paths) if path in hardening_links()]
+    links = [place for place, path in enumerate(paths) if path in shared_links()]
     units = [place for place, path in enumerate(paths) if path.startswith(UNITS) and path.endswith("@.service")]
 
-    assert len(links) == len(PARTS) + 1
-    assert max(*links, paths.index(f"{UNITS}/{HARDENING}")) < min(units)
+    assert len(links) == 2 * len(PARTS) + 1
+    assert max(*links, *(paths.index(f"{UNITS}/{name}") for name in (HARDENING, COMMON))) < min(units)
     carried_out(tmp_path, plan)
     for part in (*PARTS, METRICS):
         drop_in = tmp_path / f"etc/systemd/system/canbase-{part}@.service.d/00-hardening.conf"
         assert drop_in.read_text() == TEMPLATES.joinpath(HARDENING).read_text()
+    for part in PARTS:
+        drop_in = tmp_path / f"etc/systemd/system/canbase-{part}@.service.d/00-common.conf"
+        assert drop_in.read_text() == TEMPLATES.joinpath(COMMON).read_text()
 
 
 def test_no_unit_of_the_integrators_own_gets_the_sandbox() -> None:

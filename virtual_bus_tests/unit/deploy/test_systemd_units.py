@@ -17,7 +17,7 @@ import pytest
 from canbase_config.load import load_robot, sample
 from canbase_deploy.execute import Executor
 from canbase_deploy.host import read_templates
-from canbase_deploy.plan import HARDENING, PARTS, Request, install_plan
+from canbase_deploy.plan import COMMON, HARDENING, PARTS, Request, install_plan
 
 TEMPLATES = Path(__file__).parents[3] / "deploy" / "systemd"
 ANALYZE = shutil.which("systemd-analyze")
@@ -94,8 +94,10 @@ def test_a_unit_is_as_tight_as_stated(installed: Path, part: str, least: float) 
 
 def directives(part: str) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
-    unit, sandbox = TEMPLATES / f"canbase-{part}@.service", TEMPLATES / HARDENING
-    for line in [*unit.read_text().splitlines(), *(sandbox.read_text().splitlines() if part in PARTS else [])]:
+    shared = (HARDENING, COMMON) if part in PARTS else ()
+    for line in "\n".join(
+        (TEMPLATES / name).read_text() for name in (f"canbase-{part}@.service", *shared)
+    ).splitlines():
         key, equals, value = line.partition("=")
         if equals and not line.startswith("#"):
             found.setdefault(key, []).append(value)
