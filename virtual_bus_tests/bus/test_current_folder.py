@@ -116,8 +116,8 @@ def test_the_support_bundle_asks_no_pip_and_no_canbase_of_the_current_folder(tra
 
 
 def test_the_services_have_a_safe_path_and_a_folder_that_is_roots() -> None:
-    for part in ("watchdog", "driver", "velocity", "action-server"):
-        unit = (ROOT / "deploy" / "systemd" / f"canbase-{part}@.service").read_text().splitlines()
+    for file in ("canbase-common.conf", "canbase-metrics@.service"):
+        unit = (ROOT / "deploy" / "systemd" / file).read_text().splitlines()
         assert "WorkingDirectory=/" in unit
         assert any(
             line.startswith("Environment=") and {"PYTHONSAFEPATH=1", "PYTHONNOUSERSITE=1"} <= set(line.split())

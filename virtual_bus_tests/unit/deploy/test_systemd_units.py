@@ -72,8 +72,11 @@ def test_systemd_understands_every_line(installed: Path, unit: str) -> None:
 
 @needs_systemd
 def test_a_wrong_line_would_be_noticed(installed: Path, tmp_path: Path) -> None:
-    right = (installed / "etc/systemd/system/canbase-driver@.service").read_text()
-    (tmp_path / "canbase-driver@.service").write_text(right.replace("Restart=always", "Restart=sometimes"))
+    units = installed / "etc/systemd/system"
+    (tmp_path / "canbase-driver@.service").write_text((units / "canbase-driver@.service").read_text())
+    (tmp_path / "canbase-driver@.service.d").mkdir()
+    wrong = (units / COMMON).read_text().replace("Restart=always", "Restart=sometimes")
+    (tmp_path / "canbase-driver@.service.d" / "00-common.conf").write_text(wrong)
 
     said = analyze("verify", "--man=no", "canbase-driver@example.service", units=tmp_path)
 
