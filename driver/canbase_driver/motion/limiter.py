@@ -126,8 +126,11 @@ class Limiter:
         )
         brakes = _slows(current.linear_mps, goal.linear_mps)
         if brakes and angular_s > linear_s and not _slows(current.angular_radps, goal.angular_radps):
-            reached = _between(current, goal, linear_s / angular_s)
-            return Twist2D(goal.linear_mps, reached.angular_radps), linear_s
+            turn_radps = _between(current, goal, linear_s / angular_s).angular_radps
+            if current.angular_radps * goal.angular_radps < 0.0:
+                left_radps = abs(current.angular_radps) - limits.angular_deceleration_radps2 * linear_s
+                turn_radps = math.copysign(max(0.0, left_radps), current.angular_radps)
+            return Twist2D(goal.linear_mps, turn_radps), linear_s
         shortening = limits.deceleration_mps2 / limits.emergency_deceleration_mps2 if emergency else 1.0
         return goal, max(linear_s, angular_s) * shortening
 
@@ -149,7 +152,11 @@ def _axis_ramp_s(current: float, goal: float, acceleration: float, deceleration:
 
 
 def _waypoint(current: Twist2D, target: Twist2D) -> Twist2D:
-    """`target`, or the point on the way to it at which the linear velocity is zero, if it has to change its sign."""
+    """`target`, or the point on the way to it at which the linear velocity is zero, if it has to change its sign; where
+    it does not change at all, that at which the turn is."""
+    if abs(target.linear_mps - current.linear_mps) <= NEGLIGIBLE_MPS:
+        reverses = current.angular_radps * target.angular_radps < 0.0
+        return Twist2D(target.linear_mps, 0.0) if reverses else target
     if current.linear_mps * target.linear_mps >= 0.0:
         return target
     done = current.linear_mps / (current.linear_mps - target.linear_mps)
