@@ -158,7 +158,8 @@ class Reach:
 
     @staticmethod
     def _pushes(axis: Axis) -> bool:
-        return axis.motor.powered and not axis.encoder.closes_loop
+        brakes = axis.encoder.closes_loop and axis.faults.stop_share >= LEAST_SHARE
+        return axis.motor.powered and not brakes
 
     @staticmethod
     def _brakes_fully(motor: Motor) -> bool:
