@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from canbase_config.bounded_file import read_bounded
+
 MAX_BYTES: Final = 8_000_000
 MAX_NUMBER: Final = 200
 """Characters of a number with its $NODEID, spaces and comment: more than any data type has."""
@@ -135,8 +137,7 @@ def _term(text: str) -> int | None:
 def read_text(path: Path) -> tuple[str, str]:
     """The content of an EDS file with its line ends, and its encoding. Raises EdsError."""
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+        data = read_bounded(path, MAX_BYTES)
     except OSError as error:
         raise EdsError(f"{path}: cannot be read: {error.strerror or error}") from error
     if len(data) > MAX_BYTES or b"\0" in data:

@@ -78,6 +78,17 @@ def undecided(objects: Objects, measured: Collection[int] = ()) -> list[str]:
     ]
 
 
+def reported_velocity_unit(objects: Objects, counts: int) -> VelocityUnit | None:
+    """The unit of velocities that the drive reports; None: none, or none of those that robot.yaml takes."""
+    decoded = _velocity(objects.get((SI_VELOCITY, 0)) or _of_dimension(objects), counts)
+    return None if decoded is None else _unit_of(decoded[1], counts)
+
+
+def _unit_of(rev_s: float, counts: int) -> VelocityUnit | None:
+    units: tuple[VelocityUnit, ...] = get_args(VelocityUnit)
+    return next((unit for unit in units if _same(motor_rev_per_s(unit, counts), rev_s)), None)
+
+
 def _velocity_misfit(drive: Drive, objects: Objects, measured: Collection[int]) -> Misfit | None:
     index = SI_VELOCITY if objects.get((SI_VELOCITY, 0)) else VELOCITY_DIMENSION
     unit = objects.get((SI_VELOCITY, 0)) or _of_dimension(objects)
@@ -88,7 +99,7 @@ def _velocity_misfit(drive: Drive, objects: Objects, measured: Collection[int]) 
     here = motor_rev_per_s(drive.target_unit, drive.counts_per_motor_rev)
     if any(_same(rev_s * turns, here) for turns in _shafts(objects)):
         return None
-    fits = next((u for u in get_args(VelocityUnit) if _same(motor_rev_per_s(u, drive.counts_per_motor_rev), rev_s)), "")
+    fits = _unit_of(rev_s, drive.counts_per_motor_rev) or ""
     effect = f"its wheel would turn {rev_s / here:.3g} times as fast as commanded"
     meaning = f"one bit of 60FFh and 606Ch is {text}"
     return Misfit(index, 0, objects[index, 0], meaning, effect, "velocity_unit", drive.target_unit, fits)

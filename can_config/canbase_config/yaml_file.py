@@ -14,6 +14,7 @@ from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
+from canbase_config.bounded_file import read_bounded
 from canbase_config.errors import ConfigError, Loc, Place, Problem, key_path
 from canbase_config.yaml_limits import MAX_BYTES, MAX_DEPTH, BoundedComposer, ExcessError, line_of_brackets
 
@@ -86,8 +87,7 @@ def read_yaml(path: str | Path) -> YamlFile:
 def _text(path: Path) -> str:
     """The file as text. Raises ConfigError if it cannot be had."""
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+        content = read_bounded(path, MAX_BYTES)
         if len(content) > MAX_BYTES:
             raise ConfigError([Problem(str(path), None, "", f"larger than {MAX_BYTES} bytes")])
         return content.decode("utf-8")

@@ -145,5 +145,5 @@ def _progress(recording: Path) -> Iterator[Progress | None]:
     from rich.progress import Progress as Bar
 
     with Bar(console=Console(file=with_cursor(sys.stderr)), transient=True) as bar:
-        task = bar.add_task(f"reading {recording.name}")
+        task = bar.add_task("reading the recording")
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 from canbase_commissioning.identification import NodeCard
 from canbase_config.object_map import AXIS_OFFSET, STATUSWORD, place
-from canbase_config.profile import Profile
+from canbase_config.profile import Profile, VelocityUnit
 from canbase_config.profile_file import guess, load_profile
+from canbase_config.reported_units import SI_VELOCITY, VELOCITY_DIMENSION, VELOCITY_NOTATION, reported_velocity_unit
 from canbase_driver.boot.steps import Steps, unsigned
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
 
 ENCODER_RESOLUTION, GEAR_RATIO = 0x608F, 0x6091
 """Increments for motor revolutions; motor revolutions for shaft revolutions (sub-indexes 1 and 2, CiA 402-2)."""
+GENERIC = "generic"
 LEAST_GEAR, MOST_GEAR = 1e-3, 10_000.0
 MOST_COUNTS = 2**31 - 1
 MOST_BYTES = 4
@@ -29,6 +31,7 @@ class FoundAxis:
     """For `profile` in robot.yaml."""
     counts_per_motor_rev: int | None = None
     gear_ratio: float | None = None
+    velocity_unit: VelocityUnit | None = None
 
     @property
     def title(self) -> str:
@@ -38,13 +41,13 @@ class FoundAxis:
 
     @property
     def lacks_unit(self) -> bool:
-        """Whether robot.yaml has to name the velocity unit: the profile cannot."""
-        return load_profile(self.profile).units.target_velocity is None
+        """Whether robot.yaml has to name the velocity unit: the profile cannot, or assumes one."""
+        return self.profile == GENERIC or load_profile(self.profile).units.target_velocity is None
 
 
 def profile_of(card: NodeCard) -> str:
     """The profile that knows this drive, or the generic one for a CiA 402 drive; empty: it is no motor drive."""
-    return guess(card.vendor_id, card.product_code) or ("generic" if card.profile_402 else "")
+    return guess(card.vendor_id, card.product_code) or (GENERIC if card.profile_402 else "")
 
 
 def survey(node_id: int, profile: str) -> Steps[tuple[FoundAxis, ...]]:
@@ -59,15 +62,10 @@ def survey(node_id: int, profile: str) -> Steps[tuple[FoundAxis, ...]]:
         offset = AXIS_OFFSET * axis if layout.second_axis == "offset" else 0
         counts = yield from _ratio(ENCODER_RESOLUTION + offset)
         gear = yield from _ratio(GEAR_RATIO + offset)
-        axes.append(
-            FoundAxis(
-                node_id,
-                axis,
-                profile,
-                int(counts) if counts is not None and 1 <= counts <= MOST_COUNTS and counts.is_integer() else None,
-                gear if gear is not None and LEAST_GEAR <= gear <= MOST_GEAR else None,
-            )
-        )
+        whole = int(counts) if counts is not None and 1 <= counts <= MOST_COUNTS and counts.is_integer() else None
+        usable_gear = gear if gear is not None and LEAST_GEAR <= gear <= MOST_GEAR else None
+        unit = yield from _velocity_unit(offset, whole or 1)
+        axes.append(FoundAxis(node_id, axis, profile, whole, usable_gear, unit))
     return tuple(axes)
 
 
@@ -75,6 +73,13 @@ def _has(kind: Profile, axis: int) -> Steps[bool]:
     """Whether the axis has a statusword."""
     at = place(kind, STATUSWORD, axis)
     return (yield from _number(at.index, at.sub)) is not None
+
+
+def _velocity_unit(offset: int, counts: int) -> Steps[VelocityUnit | None]:
+    objects = {}
+    for index in (SI_VELOCITY, VELOCITY_DIMENSION, VELOCITY_NOTATION):
+        objects[index, 0] = (yield from _number(index + offset, 0)) or 0
+    return reported_velocity_unit(objects, counts)
 
 
 def _ratio(index: int) -> Steps[float | None]:

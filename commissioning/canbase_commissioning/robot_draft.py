@@ -142,7 +142,7 @@ def _ask_about_wheel(axis: FoundAxis, side: Side) -> Generator[Ask | Tell, Any, 
     unit = None
     if axis.lacks_unit:
         text = f"What one bit of its velocities (60FFh) means: {', '.join(UNITS)}"
-        unit = yield _ask(f"{key}.velocity_unit", text, _unit)
+        unit = yield _ask(f"{key}.velocity_unit", text, _unit, axis.velocity_unit)
     return [Wheel(axis, where, gear, counts, unit)]
 
 

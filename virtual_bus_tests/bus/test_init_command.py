@@ -54,7 +54,8 @@ def answer_until_the_end(page: Page) -> None:
         for question in page.questions:
             if question["ask"] not in answered:
                 answered.add(question["ask"])
-                own = "20" if question["ask"].endswith("gear_ratio") else "0.2"  # 0.2 m: where the scanner is
+                known = {"gear_ratio": "20", "velocity_unit": "0.1rpm", "x_m": "0.2"}
+                own = known.get(question["ask"].rpartition(".")[2], "")
                 page.say(answer=own if question["default"] is None else "", key=question["ask"])
         return page.process.poll() is not None
 

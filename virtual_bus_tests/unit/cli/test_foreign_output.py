@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import typer
 
+from canbase_cli import explain
 from canbase_cli.main import app
 from canbase_config.load import sample
 from canbase_runtime import terminal
@@ -63,6 +64,22 @@ def test_what_is_unbuffered_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
     print("at once")
     assert written.getvalue() == b"at once\n"
     assert terminal.with_cursor(unfiltered) is unfiltered
+
+
+def test_the_progress_of_a_long_recording_shows_no_name_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its stream lets the cursor move."""
+    file = tmp_path / "a\x1b[2Jb.log"
+    file.touch()
+    monkeypatch.setattr(explain, "LARGE_BYTES", 0)
+    monkeypatch.setattr(sys, "stderr", shown := io.StringIO())
+    monkeypatch.setattr(shown, "isatty", lambda: True, raising=False)
+    with explain._progress(file) as progress:
+        assert progress is not None
+        progress(1, 2)
+    assert "reading the recording" in shown.getvalue()
+    assert "\x1b[2J" not in shown.getvalue()
 
 
 PROGRAM = """

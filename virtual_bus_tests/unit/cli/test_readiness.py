@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from canbase_cli import main, up
 from canbase_cli.readiness import NOT_READY_S, Seen, Teller, missing
 from canbase_runtime.driver_state import DriverState
 
@@ -55,3 +59,21 @@ def test_a_latched_robot_is_told_at_once_and_how_to_reset_it() -> None:
         "NOT READY: motor_driver is latched: first start on this bus; "
         "in another terminal: `canbase doctor`, `canbase reset`"
     )
+
+
+@pytest.mark.parametrize(("words", "quiet"), [([], 1), (["-v"], 0), (["--verbose"], 0)])
+def test_v_shows_the_log_of_the_simulated_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], quiet: int
+) -> None:
+    started: list[list[str]] = []
+
+    def popen(argv: list[str], **_: object) -> subprocess.Popen[bytes]:
+        started.append(argv)
+        raise InterruptedError("no process of a unit test")
+
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(up, "_refuse_twice", lambda robot: None)
+    monkeypatch.setattr("canbase_cli.stack.subprocess.Popen", popen)
+    CliRunner().invoke(main.app, ["up", "--bench", *words])
+    (sim,) = started
+    assert (sim[sim.index("serve") + 1], sim.count("--quiet")) == ("sim", quiet)

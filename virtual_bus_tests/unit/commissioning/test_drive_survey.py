@@ -78,6 +78,17 @@ def test_a_drive_for_two_motors_has_two_axes_each_with_its_own_values() -> None:
     assert second.title == "node 5, second axis (generic CiA 402 drive)"
 
 
+@pytest.mark.parametrize(
+    ("objects", "unit"),
+    [({(0x60A9, 0): 0xFFB4_4700}, "0.1rpm"), ({(0x608C, 0): 0xA3}, "rev/s"), ({(0x60A9, 0): 1}, None), ({}, None)],
+)
+def test_the_unit_of_velocities_is_the_one_that_the_drive_reports(
+    objects: dict[tuple[int, int], int], unit: str | None
+) -> None:
+    (axis,) = answered("generic", objects)
+    assert (axis.velocity_unit, axis.lacks_unit) == (unit, True)
+
+
 def test_a_drive_without_a_second_statusword_has_one_axis() -> None:
     assert [axis.axis for axis in answered("generic", {})] == [0]
 

@@ -10,7 +10,7 @@ from canbase_config.load import load_robot
 from canbase_driver.cia301.frame import Frame
 from support.command_world import CommandWorld, canbase
 
-GEAR = "node1.gear_ratio: 20\nnode2.gear_ratio: 20\n"
+GEAR = "node1.gear_ratio: 20\nnode2.gear_ratio: 20\nnode1.velocity_unit: 0.1rpm\nnode2.velocity_unit: 0.1rpm\n"
 """What the simulated drives do not report."""
 
 
@@ -32,10 +32,11 @@ def test_two_drives_become_a_robot_yaml_that_passes_the_check(world: CommandWorl
     assert "found node 1 (generic CiA 402 drive), profile generic" in done.stdout
     robot = load_robot(output).robot
     assert (robot.name, robot.bus) == ("fred", load_robot(world.config).robot.bus)
-    assert [(d.node_id, d.side, d.counts_per_motor_rev) for d in robot.drives] == [
-        (1, "left", 4096),
-        (2, "right", 4096),
+    assert [(d.node_id, d.side, d.counts_per_motor_rev, d.velocity_unit) for d in robot.drives] == [
+        (1, "left", 4096, "0.1rpm"),
+        (2, "right", 4096, "0.1rpm"),
     ]
+    assert "have gear_ratio 20 and velocity_unit 0.1rpm" in done.stdout
     assert f"canbase setup commission --config {output}" in done.stdout
     assert canbase("config", "check", "--config", str(output)).exit_code == 0
 

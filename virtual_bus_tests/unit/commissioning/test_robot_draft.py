@@ -49,19 +49,20 @@ def loaded(folder: Path, draft: Draft, bus: Bus = CAN0, name: str = "example_can
     return load_robot(file)
 
 
-def two(profile: str = "generic", **found: float) -> list[FoundAxis]:
+def two(profile: str = "generic", **found: float | str) -> list[FoundAxis]:
     return [FoundAxis(1, 0, profile, **found), FoundAxis(2, 0, profile, **found)]  # type: ignore[arg-type]
 
 
 def test_the_proposed_answers_make_a_robot_that_passes_the_check(tmp_path: Path) -> None:
-    draft, told = answer(two(counts_per_motor_rev=4096, gear_ratio=20.0), {"scanner.x_m": "0.3"})
+    draft, told = answer(two(counts_per_motor_rev=4096, gear_ratio=20.0, velocity_unit="0.1rpm"), {"scanner.x_m": "0.3"})
     robot = loaded(tmp_path, draft).robot
     assert told == []
     assert [(d.joint, d.node_id, d.axis, d.side, d.direction) for d in robot.drives] == [
         ("left_wheel", 1, 0, "left", 1),
         ("right_wheel", 2, 0, "right", -1),
     ]
-    assert {(d.gear_ratio, d.counts_per_motor_rev, d.profile) for d in robot.drives} == {(20.0, 4096, "generic")}
+    assert {(d.gear_ratio, d.counts_per_motor_rev, d.velocity_unit) for d in robot.drives} == {(20.0, 4096, "0.1rpm")}
+    assert {d.profile for d in robot.drives} == {"generic"}
     assert (robot.bus.interface, robot.bus.channel, robot.bus.bitrate) == ("socketcan", "can0", 250_000)
     assert (robot.base.wheel_radius_m, robot.base.track_m, robot.limits.linear_mps) == (0.1, 0.5, 0.3)
     assert (robot.safety.scan.required, robot.safety.estop.required) == (True, True)

@@ -5,6 +5,7 @@ Soon is counted in calls of Python functions, not by a clock: the sample robot t
 
 from __future__ import annotations
 
+import os
 import random
 import sys
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from types import FrameType
 
 import pytest
 
+from canbase_config import bounded_file
 from canbase_config.eds_file import EdsError, number, read_eds
 from canbase_config.errors import MOST_TOLD, ConfigError, Problem, printable
 from canbase_config.from_eds import draft
@@ -101,6 +103,25 @@ def test_a_robot_yaml_beyond_every_measure_ends_in_a_short_error_of_our_own(
     assert told in said
     assert len(said) < LONGEST
     assert len(said.splitlines()) <= 2 * MOST_TOLD + 1
+
+
+def test_a_pipe_is_read_to_its_end_and_no_longer_than_its_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`canbase config check <(generator)`; and a pipe or device that never ends."""
+    monkeypatch.setattr(bounded_file, "WAIT_S", 0.0)
+    reader, writer = os.pipe()
+    os.write(writer, GOOD.encode())
+    with pytest.raises(ConfigError, match=rf"^/dev/fd/{reader}: cannot be read: a pipe or device without an end"):
+        load_robot(f"/dev/fd/{reader}")
+    os.write(writer, GOOD.encode())
+    os.close(writer)
+    assert load_robot(f"/dev/fd/{reader}").robot.drives
+    os.close(reader)
+    os.mkfifo(tmp_path / "robot.yaml")
+    for name, why in ((str(tmp_path / "robot.yaml"), "without an end"), ("/dev/zero", "larger than")):
+        with pytest.raises(ConfigError, match=f"^{name}: .*{why}"):
+            load_robot(name)
 
 
 def test_what_is_within_every_limit_is_read(tmp_path: Path) -> None:
