@@ -155,7 +155,7 @@ bench: $(VENV)/ready ## every budget of this computer, measured beside a floor: 
 ifdef NAME
 	canbase prove benchmark $(NAME)
 else
-	canbase prove benchmark --write docs/performance.md --json benchmarks/kept.json
+	canbase prove benchmark --write docs/performance.md --ratios benchmarks/kept.json
 endif
 
 .PHONY: pictures

@@ -13,7 +13,7 @@ WAIT_S: Final = 10.0
 
 
 def read_bounded(path: Path, most_bytes: int) -> bytes:
-    """The content, of a larger file its first `most_bytes` + 1. Raises OSError; TimeoutError where a pipe has no end."""
+    """The content; of a larger file its first `most_bytes` + 1. Raises OSError, for a pipe without an end too."""
     ends_s, content = time.monotonic() + WAIT_S, b""
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:

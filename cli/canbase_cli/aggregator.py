@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
-from canbase_cli.options import ConfigOption
+from canbase_cli.options import ConfigOption, RobotFile, one_of
 from canbase_runtime.terminal import load_config
 
 
 def aggregator(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
-    ] = None,
+    file: RobotFile = None,
     config: ConfigOption = None,
 ) -> None:
     """Print parameters of diagnostic_aggregator: the groups of /diagnostics, and what must be there.
@@ -27,6 +22,4 @@ def aggregator(
     """
     from canbase_config.aggregator import parameter_file
 
-    if file is not None and config is not None:
-        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
-    typer.echo(parameter_file(load_config(config or file, quiet=True).robot), nl=False)
+    typer.echo(parameter_file(load_config(one_of(file, config), quiet=True).robot), nl=False)

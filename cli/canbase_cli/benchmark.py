@@ -20,12 +20,12 @@ def benchmark(
     ] = None,
     list_them: Annotated[bool, typer.Option("--list", help="List them, run none.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Only the fast ones, in less than a minute.")] = False,
-    write_json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Keep the ratios in this file.")
+    ratios: Annotated[
+        Path | None, typer.Option("--ratios", metavar="FILE", help="Keep the ratios in this file.")
     ] = None,
     compare: Annotated[
         Path | None,
-        typer.Option("--compare", metavar="FILE", help="Name the ratios that are worse than in a file of --json."),
+        typer.Option("--compare", metavar="FILE", help="Name the ratios that are worse than in a file of --ratios."),
     ] = None,
     write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")] = None,
 ) -> None:
@@ -38,7 +38,7 @@ def benchmark(
     script = root / "benchmarks" / "run.py"
     if not script.exists():
         fail("the benchmarks come with the sources: clone the repository, and there `make bench`", FAILED)
-    files = {"--write": write, "--json": write_json, "--compare": compare}
+    files = {"--write": write, "--json": ratios, "--compare": compare}
     options = [word for name, path in files.items() if path for word in (name, str(path.resolve()))]
     options += [name for name, chosen in {"--list": list_them, "--quick": quick}.items() if chosen]
     environment = os.environ | {"PYTHONPATH": str(root / "virtual_bus_tests")}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from canbase_cli.goal import CANCELED, NO_SERVER, REJECTED, Interrupts
-from canbase_cli.options import NamespaceOption, ros_arguments, ros_needed
+from canbase_cli.options import ConfigOption, NamespaceOption, RobotFile, one_of, ros_arguments, ros_needed
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
@@ -19,20 +19,22 @@ if TYPE_CHECKING:
     from canbase_config.robot import Robot
 
 EPILOG: Final = (
-    "Examples:  \ncanbase setup calibrate robot.yaml  \ncanbase setup calibrate robot.yaml --side 2 --squares 3 --write"
+    "Examples:  \ncanbase setup calibrate --config robot.yaml  \n"
+    "canbase setup calibrate --config robot.yaml --side 2 --squares 3 --write"
 )
 
 
 def calibrate(
     ctx: typer.Context,
-    config: Annotated[Path, typer.Argument(metavar="FILE", help="The robot.yaml; --write changes it.")],
+    file: RobotFile = None,
+    config: ConfigOption = None,
     side_m: Annotated[float, typer.Option("--side", metavar="M", min=0.5, max=10.0, help="Side of the squares.")] = 1.5,
     squares: Annotated[int, typer.Option("--squares", metavar="N", min=1, max=20, help="In each direction.")] = 4,
     linear_mps: Annotated[float, typer.Option("--speed", metavar="M/S", min=0.05, max=1.0, help="Along a side.")] = 0.3,
     angular_radps: Annotated[
         float, typer.Option("--turn-speed", metavar="RAD/S", min=0.1, max=2.0, help="At a corner.")
     ] = 0.5,
-    write: Annotated[bool, typer.Option("--write", help="Write the new values into FILE; its comments stay.")] = False,
+    write: Annotated[bool, typer.Option("--write", help="Write the new values into it; its comments stay.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="The space is free: do not ask. For tests.")] = False,
     namespace: NamespaceOption = "",
 ) -> None:
@@ -52,7 +54,7 @@ def calibrate(
         from canbase_cli.calibration_drive import CalibrationDrive
         from canbase_commissioning.umbmark.verdict import course_of
 
-    loaded = load_config(config, quiet=True)
+    loaded = load_config(one_of(file, config), quiet=True)
     _usable(loaded.robot)
     course = course_of(loaded.robot, side_m, squares)
     typer.echo(
@@ -70,7 +72,7 @@ def calibrate(
             _drive(drive, course, linear_mps, angular_radps)
     finally:
         rclpy.try_shutdown()
-    _finish(config, loaded.robot, course, write=write)
+    _finish(loaded.path, loaded.robot, course, write=write)
 
 
 def _usable(robot: Robot) -> None:

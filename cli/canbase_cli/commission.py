@@ -8,6 +8,7 @@ from typing import Annotated, Final
 import typer
 
 from canbase_cli.completion import one_more_of
+from canbase_cli.options import ConfigOption
 from canbase_runtime.terminal import WRONG_INPUT, fail
 
 EPILOG: Final = (
@@ -27,7 +28,7 @@ def _steps(text: str) -> str:
 
 
 def commission(
-    config: Annotated[Path, typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml; it is changed.")],
+    config: ConfigOption = None,
     steps: Annotated[
         str,
         typer.Option(
@@ -83,8 +84,6 @@ def commission(
 
     if report is not None and report.exists():
         fail(f"{report} exists; a report is never overwritten: give --report another name", WRONG_INPUT)
-    if not config.exists():
-        fail(f"{config} does not exist: canbase setup init writes one", WRONG_INPUT)
     plan = Plan(
         frozenset(steps.split(",")),
         speed_mps,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from canbase_cli.options import ConfigOption
+from canbase_cli.options import ConfigOption, RobotFile, one_of
 from canbase_runtime.terminal import FAILED, colour, fail, load_config, warn
 
 if TYPE_CHECKING:
@@ -27,9 +27,7 @@ def _group() -> None:
 
 @app.command()
 def check(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
-    ] = None,
+    file: RobotFile = None,
     config: ConfigOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print problems only, and no warnings.")] = False,
 ) -> None:
@@ -41,9 +39,7 @@ def check(
     """
     from canbase_config.effective import DEFAULT_MARK, effective
 
-    if file is not None and config is not None:
-        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
-    loaded = load_config(config or file, quiet=quiet)
+    loaded = load_config(one_of(file, config), quiet=quiet)
     if quiet:
         return
     for sentence in _bus_warnings(loaded.robot.bus):

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from canbase_cli.options import ConfigOption
+from canbase_cli.options import ConfigOption, RobotFile, one_of
 from canbase_runtime.terminal import load_config
 
 
 def ekf(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
-    ] = None,
+    file: RobotFile = None,
     config: ConfigOption = None,
     imu: Annotated[str, typer.Option("--imu", metavar="TOPIC", help="sensor_msgs/Imu, in its own frame.")] = "imu",
 ) -> None:
@@ -30,9 +27,7 @@ def ekf(
     from canbase_config.robot_localization import ekf as parameters
     from canbase_config.robot_localization import note
 
-    if file is not None and config is not None:
-        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
-    robot = load_config(config or file, quiet=True).robot
+    robot = load_config(one_of(file, config), quiet=True).robot
     if missing := note(robot):
         typer.echo(f"note: {missing}", err=True)
     typer.echo(parameters(robot, imu), nl=False)

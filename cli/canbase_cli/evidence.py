@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from canbase_cli.options import ConfigOption, RobotFile, one_of
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
 if TYPE_CHECKING:
@@ -26,11 +27,16 @@ EPILOG: Final = (
 
 
 def evidence(
-    config: Annotated[Path | None, typer.Argument(metavar="ROBOT.YAML", help="The robot.")] = None,
+    file: RobotFile = None,
+    config: ConfigOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FOLDER", help="New folder to write.", show_default="evidence-ROBOT-DATE-TIME here"
+            "--output",
+            "-o",
+            metavar="FOLDER",
+            help="New folder to write.",
+            show_default="evidence-ROBOT-DATE-TIME here",
         ),
     ] = None,
     qualification: Annotated[
@@ -50,7 +56,7 @@ def evidence(
             "--commissioning",
             metavar="FILE",
             help="Report of canbase setup commission; repeatable.",
-            show_default="those beside ROBOT.YAML",
+            show_default="those beside robot.yaml",
         ),
     ] = None,
     scan: Annotated[
@@ -74,19 +80,17 @@ def evidence(
     command line or robot.yaml, 3 written, and something is missing, has failed or does not count.
     """
     if check is not None:
-        if config is not None:
-            fail("--check takes no ROBOT.YAML: it compares a folder with its own list", WRONG_INPUT)
+        if file or config:
+            fail("--check takes no robot.yaml: it compares a folder with its own list", WRONG_INPUT)
         _check(check)
         return
-    if config is None:
-        fail("name a robot.yaml, or --check FOLDER", WRONG_INPUT)
     from canbase_evidence.gather import Sources
 
     sources = Sources(qualification, tests or (), recordings or (), commissioning or (), scan)
-    _gather(config, sources, out)
+    _gather(one_of(file, config), sources, out)
 
 
-def _gather(config: Path, sources: Sources, out: Path | None) -> None:
+def _gather(config: Path | None, sources: Sources, out: Path | None) -> None:
     from dataclasses import replace
 
     from canbase_evidence.gather import gather, reports_beside
@@ -98,7 +102,7 @@ def _gather(config: Path, sources: Sources, out: Path | None) -> None:
     stamp = datetime.fromtimestamp(made_s, timezone.utc)
     out = out or Path(f"evidence-{loaded.robot.name}-{stamp:%Y%m%d-%H%M%S}")
     if out.is_symlink() or (out.exists() and not (out.is_dir() and not any(out.iterdir()))):
-        fail(f"{out} exists; evidence is never overwritten: name another --out", WRONG_INPUT)
+        fail(f"{out} exists; evidence is never overwritten: name another --output", WRONG_INPUT)
     if not sources.commissioning:
         sources = replace(sources, commissioning=reports_beside(loaded))
     try:

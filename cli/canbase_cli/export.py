@@ -10,14 +10,16 @@ import typer
 from canbase_cli.explain import ChannelOfFile, RecordingConfig, recorded_robot
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
-EPILOG: Final = "For example: canbase record export stop.asc --config robot.yaml --mcap stop.mcap"
+EPILOG: Final = "For example: canbase record export stop.asc --config robot.yaml --output stop.mcap"
 
 
 def export(
     recording: Annotated[
         Path, typer.Argument(metavar="FILE", help="What canbase explain reads: ASC, candump -L, BLF, …")
     ],
-    mcap: Annotated[Path, typer.Option("--mcap", metavar="FILE", help="The file to write; it must not exist yet.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write; it must not exist yet.")
+    ],
     config: RecordingConfig = None,
     channel: ChannelOfFile = None,
 ) -> None:
@@ -38,13 +40,13 @@ def export(
     from canbase_recording.recording_file import NoRecordingError
 
     try:
-        read, written = write(recording, mcap, robot, channel)
+        read, written = write(recording, output, robot, channel)
     except NoRecordingError as error:
         fail(str(error), FAILED)
     except (FileExistsError, FileNotFoundError, NotADirectoryError, PermissionError) as error:
-        fail(f"{mcap} cannot be written: {error.strerror}", WRONG_INPUT)
+        fail(f"{output} cannot be written: {error.strerror}", WRONG_INPUT)
     except OSError as error:
-        fail(f"{mcap} is not complete: {error.strerror or error}", FAILED)
+        fail(f"{output} is not complete: {error.strerror or error}", FAILED)
     for sentence in read.problems.sentences:
         warn(sentence)
-    typer.echo(f"{mcap}: {read.frames} frames, {written.total()} messages of {len(written)} topics", err=True)
+    typer.echo(f"{output}: {read.frames} frames, {written.total()} messages of {len(written)} topics", err=True)

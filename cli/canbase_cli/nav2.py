@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from canbase_cli.options import ConfigOption, NamespaceOption
+from canbase_cli.options import ConfigOption, NamespaceOption, RobotFile, one_of
 from canbase_runtime.terminal import WRONG_INPUT, fail, load_config
 
 ParamsOption = Annotated[
@@ -20,9 +20,7 @@ LaunchOption = Annotated[bool, typer.Option("--launch", help="Print a launch fil
 
 
 def nav2(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
-    ] = None,
+    file: RobotFile = None,
     config: ConfigOption = None,
     params: ParamsOption = None,
     launch: LaunchOption = False,
@@ -42,13 +40,11 @@ def nav2(
     from canbase_config.nav2_params import parameters, speeds
     from canbase_config.nav2_text import launch_file, merged_file, other_controller, parameter_file
 
-    if file is not None and config is not None:
-        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
     if launch and params is not None:
         raise typer.BadParameter(
             "--launch prints no parameters: call canbase print nav2 once with --params, once with --launch"
         )
-    robot = load_config(config or file, quiet=True).robot
+    robot = load_config(one_of(file, config), quiet=True).robot
     try:
         wiring, values = chain(robot, namespace), parameters(robot, namespace)
         notes, known = list(wiring.notes), True

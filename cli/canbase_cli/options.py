@@ -23,6 +23,8 @@ from canbase_runtime.wrong_start import WrongStartError
 ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
 WRONG_COMMAND_LINE: Final = 2
 ROS_FLAG: Final = "--ros-args"
+OLD_OPTIONS: Final = {"out": "output", "mcap": "output"}
+"""Names of options up to version 0.1, each with the present one. To go in 0.3, as `old_names.py`."""
 _GENERATOR: Final = "rosidl_generator_py.generate_py_impl"
 """The messages' package imports the generator of their Python code, a parser with it, wherever that can be imported.
 Only a build needs it: 2.6 MB of each process, and 0.02 s of its start."""
@@ -36,7 +38,10 @@ def new_app(group: type[TyperGroup] = TyperGroup) -> typer.Typer:
         cls=group,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={
+            "help_option_names": ["-h", "--help"],
+            "token_normalize_func": lambda word: OLD_OPTIONS.get(word, word),
+        },
     )
 
 
@@ -47,6 +52,13 @@ def named(config: Path | None, *, bench: bool) -> Path | None:
     if bench and config is not None:
         raise typer.BadParameter("give --config or --bench, not both")
     return sample("bench") if bench else config
+
+
+def one_of(file: Path | None, config: Path | None) -> Path | None:
+    """The robot.yaml of a command that takes it as FILE too. Raises typer.BadParameter."""
+    if file is not None and config is not None:
+        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
+    return config or file
 
 
 def _namespace(text: str) -> str:
@@ -62,6 +74,9 @@ def _namespace(text: str) -> str:
 ConfigOption = Annotated[
     Path | None,
     typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the robot here"),
+]
+RobotFile = Annotated[
+    Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
 ]
 BenchOption = Annotated[bool, typer.Option("--bench", help="The simulated robot that comes with canbase.")]
 NamespaceOption = Annotated[

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
 import typer
 
+from canbase_cli.options import ConfigOption, RobotFile, one_of
 from canbase_cli.qualify_report import write, write_and_exit
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, with_cursor
 
@@ -50,7 +51,8 @@ def _number(default: int, what: str) -> Any:
 
 
 def qualify(
-    config: Annotated[Path, typer.Argument(metavar="FILE", help="The robot.yaml.")],
+    file: RobotFile = None,
+    config: ConfigOption = None,
     scenarios: Annotated[int | None, _number(1000, "Runs with several overlapping failures.")] = None,
     stops: Annotated[int | None, _number(20, "How often each single failure stops the base.")] = None,
     drives: Annotated[int | None, _number(20, "Drives of a minute without any failure.")] = None,
@@ -66,7 +68,8 @@ def qualify(
         int | None, typer.Option(min=1, max=1024, metavar="N", help="Processes.", show_default="all processors")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="For the results.", show_default="qualification_NAME")
+        Path | None,
+        typer.Option("--output", "-o", metavar="FOLDER", help="For the results.", show_default="qualification_NAME"),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the results in the folder.")] = False,
     report: Annotated[
@@ -94,7 +97,7 @@ def qualify(
     wrong command line or robot.yaml, 130 after Ctrl-C: what is done stays, and --resume goes on.
     """
     payloads = None if payload is None else payload_range(payload)
-    loaded = load_config(config, quiet=True)
+    loaded = load_config(one_of(file, config), quiet=True)
     if scenario is not None or stop is not None:
         _print_run(loaded, _load(payloads, slope), scenario, stop, frames=frames)
     given = {"scenarios": scenarios, "stops": stops, "drives": drives, "first": seed}
@@ -175,7 +178,7 @@ class _Qualify:
         from canbase_qualification.results_file import ResultsError, ResultsFile
         from canbase_qualification.worker import WorkerDiedError, WorkError
 
-        again = f"canbase prove qualify {self._loaded.path} --out {self._folder} --resume goes on"
+        again = f"canbase prove qualify {self._loaded.path} --output {self._folder} --resume goes on"
         try:
             job, about = self._prepared(resume=resume)
             with ResultsFile(self._folder) as results:
@@ -216,7 +219,7 @@ class _Qualify:
             self._folder.mkdir(parents=True, exist_ok=True)
             folder.write(self._folder, about, self._loaded.path.read_bytes())
         except OSError as error:
-            fail(f"--out {self._folder} cannot be written: {error.strerror}", WRONG_INPUT)
+            fail(f"--output {self._folder} cannot be written: {error.strerror}", WRONG_INPUT)
         return job, about
 
     def _trial(self, job: Job, body: int) -> tuple[float, tuple[str, ...]]:

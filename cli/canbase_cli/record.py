@@ -27,7 +27,7 @@ _NAME: Final = re.compile(r"record_[^/]*\.asc")
 
 EPILOG: Final = (
     "Examples:  \ncanbase record start              the last seconds, into the folder of the black box  \n"
-    "canbase record start --seconds 5 --out turn.asc;  canbase explain turn.asc"
+    "canbase record start --seconds 5 --output turn.asc;  canbase explain turn.asc"
 )
 
 
@@ -35,7 +35,9 @@ def record(
     ctx: typer.Context,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE.asc", help="Copy it there, with its .json; it must not exist yet."),
+        typer.Option(
+            "--output", "-o", metavar="FILE.asc", help="Copy it there, with its .json; it must not exist yet."
+        ),
     ] = None,
     seconds: Annotated[
         float | None, typer.Option("--seconds", min=0.1, help="End after this time.", show_default="now")
@@ -68,7 +70,7 @@ def record(
 
 def _check(out: Path) -> None:
     if out.suffix != ".asc":
-        fail(f"--out {out}: its name must end with .asc; the .json file is written beside it", WRONG_INPUT)
+        fail(f"--output {out}: its name must end with .asc; the .json file is written beside it", WRONG_INPUT)
     for each in (out.with_suffix(suffix) for suffix in SUFFIXES):
         if each.exists() or each.is_symlink():
             fail(f"{each} exists already", WRONG_INPUT)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from canbase_cli.options import ConfigOption
+from canbase_cli.options import ConfigOption, RobotFile, one_of
 from canbase_runtime.terminal import WRONG_INPUT, fail, load_config
 
 
 def urdf(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)
-    ] = None,
+    file: RobotFile = None,
     config: ConfigOption = None,
     controllers: Annotated[
         bool,
@@ -32,9 +29,7 @@ def urdf(
     from canbase_config import ros2_control
     from canbase_config.urdf import urdf as of_robot
 
-    if file is not None and config is not None:
-        raise typer.BadParameter("give the robot.yaml once: --config FILE, or FILE alone")
-    robot = load_config(config or file, quiet=True).robot
+    robot = load_config(one_of(file, config), quiet=True).robot
     try:
         text = ros2_control.controllers(robot) if controllers else of_robot(robot)
     except ValueError as error:

@@ -19,7 +19,7 @@ ALL_FILES: Final = (*FILES, "qualification.json", "robot.yaml")
 PASSED, FAILED = "passed", "failed"
 _GRADES: Final[Mapping[str, Standing]] = {PASSED: Standing.PRESENT, FAILED: Standing.FAILED}
 """`grade` of report.json; any other one has proven nothing."""
-_CURE: Final = "canbase prove qualify robot.yaml --out FOLDER; then --qualification FOLDER"
+_CURE: Final = "canbase prove qualify robot.yaml --output FOLDER; then --qualification FOLDER"
 
 
 @dataclass(frozen=True, slots=True)

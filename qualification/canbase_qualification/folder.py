@@ -64,7 +64,7 @@ def read_about(folder: Path) -> About:
 def check_new(folder: Path) -> None:
     """FolderError: something of a qualification is there already."""
     if (folder / NAME).exists():
-        raise FolderError(f"{folder} has results already: --resume goes on with them, --out names another folder")
+        raise FolderError(f"{folder} has results already: --resume goes on with them, --output names another folder")
 
 
 def check_same(folder: Path, before: About, now: About) -> None:
@@ -72,10 +72,10 @@ def check_same(folder: Path, before: About, now: About) -> None:
     if before.software != now.software:
         raise FolderError(
             f"{folder} was computed by {before.software}; this is {now.software}. Results of both do not belong "
-            "together: go on with the same version, or begin again with another --out"
+            "together: go on with the same version, or begin again with another --output"
         )
     if before.load != now.load:
-        raise FolderError(f"{folder} has {_words(before.load)}; now it is {_words(now.load)}. Choose another --out")
+        raise FolderError(f"{folder} has {_words(before.load)}; now it is {_words(now.load)}. Choose another --output")
     check_robot(folder, before, now.file, now.configuration_sha256)
 
 
@@ -84,7 +84,7 @@ def check_robot(folder: Path, before: About, file: str, sha256: str) -> None:
     if before.configuration_sha256 != sha256:
         raise FolderError(
             f"{folder} is about another configuration: SHA-256 {before.configuration_sha256[:DIGITS]}…, and {file} has "
-            f"{sha256[:DIGITS]}…. Compare it with {folder / ROBOT}, or choose another --out"
+            f"{sha256[:DIGITS]}…. Compare it with {folder / ROBOT}, or choose another --output"
         )
 
 

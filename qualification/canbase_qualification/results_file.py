@@ -33,7 +33,7 @@ def _lines(path: Path) -> Iterator[tuple[int, bytes, Outcome]]:
             try:
                 yield at, line, Outcome.of_line(line.decode("utf-8"))
             except (BrokenLineError, UnicodeDecodeError) as error:
-                raise ResultsError(f"{path}:{number}: {error}. Delete this line, or choose another --out") from error
+                raise ResultsError(f"{path}:{number}: {error}. Delete this line, or choose another --output") from error
             at += len(line)
 
 

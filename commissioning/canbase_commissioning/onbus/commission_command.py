@@ -57,9 +57,10 @@ class Plan:
     """None: beside robot.yaml, with the robot's name and the date."""
 
 
-def run(config: Path, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool, as_json: bool) -> None:
+def run(given: Path | None, plan: Plan, answers: Path | None, *, yes: bool, dry_run: bool, as_json: bool) -> None:
     """All steps; exits with 1 when the self-stop is not proven, or not all was done."""
-    robot = load_config(config).robot
+    loaded = load_config(given)
+    config, robot = loaded.path, loaded.robot
     person: Person = RemoteOperator() if as_json else Operator(answers, yes=yes)
     results = Results(dry_run=dry_run)
     with open_line(robot.bus) as line, stopping_signals():

@@ -65,3 +65,28 @@ def test_new_names_and_unknown_ones_stay() -> None:
     assert renamed(["bus", "scan"]) is None
     assert renamed(["docter"]) is None
     assert renamed([]) is None
+
+
+@pytest.mark.parametrize("option", ["--output", "-o", "--out"])
+def test_each_file_that_is_written_is_named_by_output_and_by_its_old_name(option: str) -> None:
+    done = CliRunner().invoke(app, ["record", "start", option, "a.txt"])
+    assert (done.exit_code, done.stderr.split(":")[1]) == (2, " --output a.txt")
+    done = CliRunner().invoke(
+        app, ["record", "export", "none.asc", "--mcap" if option == "--out" else option, "a.mcap"]
+    )
+    assert "none.asc" in done.stderr
+
+
+@pytest.mark.parametrize("words", ["prove qualify", "prove evidence", "setup calibrate", "print urdf", "config check"])
+def test_a_robot_yaml_is_named_once(words: str) -> None:
+    done = CliRunner().invoke(app, [*words.split(), "a.yaml", "--config", "b.yaml"], env={"COLUMNS": "200"})
+    assert done.exit_code == 2
+    assert "give the robot.yaml once: --config FILE, or FILE alone" in done.stderr
+
+
+def test_no_command_demands_a_robot_yaml_where_one_is_here() -> None:
+    for words in leaves(typer.main.get_command(app)):
+        command = typer.main.get_command(app)
+        for word in words:
+            command = command.commands[word]  # type: ignore[attr-defined]
+        assert not [each for each in command.params if "--config" in each.opts and each.required], words

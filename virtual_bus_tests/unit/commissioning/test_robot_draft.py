@@ -54,7 +54,9 @@ def two(profile: str = "generic", **found: float | str) -> list[FoundAxis]:
 
 
 def test_the_proposed_answers_make_a_robot_that_passes_the_check(tmp_path: Path) -> None:
-    draft, told = answer(two(counts_per_motor_rev=4096, gear_ratio=20.0, velocity_unit="0.1rpm"), {"scanner.x_m": "0.3"})
+    draft, told = answer(
+        two(counts_per_motor_rev=4096, gear_ratio=20.0, velocity_unit="0.1rpm"), {"scanner.x_m": "0.3"}
+    )
     robot = loaded(tmp_path, draft).robot
     assert told == []
     assert [(d.joint, d.node_id, d.axis, d.side, d.direction) for d in robot.drives] == [

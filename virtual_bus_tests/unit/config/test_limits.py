@@ -105,9 +105,7 @@ def test_a_robot_yaml_beyond_every_measure_ends_in_a_short_error_of_our_own(
     assert len(said.splitlines()) <= 2 * MOST_TOLD + 1
 
 
-def test_a_pipe_is_read_to_its_end_and_no_longer_than_its_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pipe_is_read_to_its_end_and_no_longer_than_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`canbase config check <(generator)`; and a pipe or device that never ends."""
     monkeypatch.setattr(bounded_file, "WAIT_S", 0.0)
     reader, writer = os.pipe()

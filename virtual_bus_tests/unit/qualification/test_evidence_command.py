@@ -375,9 +375,8 @@ def test_a_link_among_recordings_is_refused(tmp_path: Path, robot_yaml: Path) ->
     assert (code, "links are not followed" in told) == (2, True)
 
 
-@pytest.mark.parametrize("words", [(), ("robot.yaml", "--check", "folder")])
-def test_it_needs_a_robot_or_a_folder(words: tuple[str, ...]) -> None:
-    assert run(*words)[0] == 2
+def test_a_robot_and_a_folder_are_no_question() -> None:
+    assert run("robot.yaml", "--check", "folder")[0] == 2
 
 
 def test_a_disk_that_takes_nothing_leaves_nothing(tmp_path: Path, robot_yaml: Path) -> None:

@@ -28,7 +28,7 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
 def test_results_are_not_overwritten(tmp_path: Path) -> None:
     folder.check_new(tmp_path)
     folder.write(tmp_path, ABOUT, b"")
-    with pytest.raises(FolderError, match="has results already: --resume goes on with them, --out names another"):
+    with pytest.raises(FolderError, match="has results already: --resume goes on with them, --output names another"):
         folder.check_new(tmp_path)
 
 
