@@ -37,6 +37,7 @@ def dump(
         list[Kind] | None, typer.Option("--kind", help="Frames of this kind; repeatable.", show_default="all")
     ] = None,
     eds: EdsOption = None,
+    file: Annotated[str, typer.Argument(hidden=True)] = "",
 ) -> None:
     """Show each frame on the bus in words, until Ctrl-C. It sends nothing.
 
@@ -51,6 +52,8 @@ def dump(
     from canbase_recording.live_bus import LiveBus, LiveBusError
     from canbase_recording.live_words import LiveWords
 
+    if file:
+        raise typer.BadParameter(f"dump listens to a bus. A recording: canbase explain {file}")
     bus, robot = choose_bus(config, interface, channel, bitrate)
     try:
         words = LiveWords(robot, known_objects(eds or ()), frozenset(nodes or ()), frozenset(kinds or ()))

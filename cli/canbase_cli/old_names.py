@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from difflib import get_close_matches
 from typing import Any, Final
 
 import typer
@@ -41,4 +42,8 @@ class OldNames(TyperGroup):
         words = None if ctx.resilient_parsing and args[:1] == ["record"] else renamed(args)
         if words is not None and sys.stderr.isatty() and not ctx.resilient_parsing:
             typer.echo(f"canbase {args[0]} is now: canbase {' '.join(words[:2])}", err=True)
+        if words is None and args[0] not in self.commands:
+            near = get_close_matches(args[0], [*self.commands, *NEW])
+            meant = ", ".join(repr(" ".join(NEW.get(name, (name,)))) for name in near)
+            ctx.fail(f"No such command {args[0]!r}." + (f" Did you mean {meant}?" if near else ""))
         return super().resolve_command(ctx, words or args)

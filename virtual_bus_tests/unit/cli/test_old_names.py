@@ -90,3 +90,18 @@ def test_no_command_demands_a_robot_yaml_where_one_is_here() -> None:
         for word in words:
             command = command.commands[word]  # type: ignore[attr-defined]
         assert not [each for each in command.params if "--config" in each.opts and each.required], words
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("scna", "No such command 'scna'. Did you mean 'bus scan'?"),
+        ("stopp", "Did you mean 'stop'"),
+        ("xyzzy", "No such command 'xyzzy'."),
+        ("bus dump stop.asc", "A recording: canbase explain stop.asc"),
+    ],
+)
+def test_a_wrong_command_line_names_the_command_that_is_meant(words: str, told: str) -> None:
+    done = CliRunner().invoke(app, words.split(), env={"COLUMNS": "200"})
+    assert done.exit_code == 2
+    assert told in done.stderr
