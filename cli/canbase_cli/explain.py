@@ -64,7 +64,7 @@ def explain(
         typer.Option("--bitrate", metavar="BIT/S", min=10_000, help="Of the bus, for its load.", show_default="500000"),
     ] = None,
 ) -> None:
-    """Explain what stopped the robot: the first cause of each stop, which part reacted, and what each part did then.
+    """Explain a recording (black box, candump): what stopped the robot, which part reacted, what each part did then.
 
     It also explains recordings of other CiA 402 networks: states, missing heartbeats, emergencies, SDO aborts. Without
     a robot.yaml, speeds are the raw numbers of the drives. What the recording does not show is reported as such.

@@ -103,7 +103,9 @@ def _group(name: str, about: str) -> typer.Typer:
     return group
 
 
-_setup = _group("setup", "From new drives to installed services: init, commission, calibrate, install.")
+_setup = _group(
+    "setup", "From new drives to services: init (writes robot.yaml), commission, calibrate, install, uninstall."
+)
 _setup.command("init", epilog=init.EPILOG)(init.init)
 _setup.command("commission", epilog=commission.EPILOG)(commission.commission)
 _setup.command("calibrate", **_ROS, epilog=calibrate.EPILOG)(calibrate.calibrate)
@@ -112,7 +114,7 @@ _setup.command("uninstall")(install.uninstall)
 
 app.add_typer(config.app, name="config", rich_help_panel=_GROUPS)
 
-_bus = _group("bus", "The CAN bus and the drives on it: scan, dump, sdo, params, nmt, emcy, jog, adopt.")
+_bus = _group("bus", "The CAN bus and its drives: scan, dump, sdo, params, nmt, emcy, jog, adopt (node ids by LSS).")
 _bus.command("scan", epilog=scan.EPILOG)(scan.scan)
 _bus.command("dump", epilog=dump.EPILOG)(dump.dump)
 _bus.add_typer(sdo.app, name="sdo")
@@ -122,14 +124,18 @@ _bus.command("emcy", epilog=emcy.EPILOG)(emcy.emcy)
 _bus.command("jog", epilog=jog.EPILOG)(jog.jog)
 _bus.command("adopt", epilog=adopt.EPILOG)(adopt.adopt)
 
-_print = _group("print", "Files, printed: sample (a robot.yaml), urdf, nav2, ekf, aggregator (of diagnostics).")
+_print = _group(
+    "print", "Files, printed: sample (a robot.yaml), urdf (and ros2_control), nav2, ekf, aggregator (of diagnostics)."
+)
 _print.command("sample")(sample.sample)
 _print.command("urdf")(urdf.urdf)
 _print.command("nav2")(nav2.nav2)
 _print.command("ekf")(ekf.ekf)
 _print.command("aggregator")(aggregator.aggregator)
 
-_record = _group("record", "Recordings: start (or keep the last seconds), replay, export, bundle (for remote help).")
+_record = _group(
+    "record", "Recordings: start (or keep the last seconds), replay, export (to MCAP), bundle (for remote help)."
+)
 _record.command("start", **_ROS, epilog=record.EPILOG)(record.record)
 _record.command("replay", epilog=replay.EPILOG)(replay.replay)
 _record.command("export", epilog=export.EPILOG)(export.export)
