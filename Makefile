@@ -122,7 +122,7 @@ fuzz: $(VENV)/ready ## a million random and malformed frames and leases against 
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.fuzz
 
 UNIT = $(TESTS)/unit
-DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis stall let_go state_machine state_machine_way_down fault_reset standstill braking) \
+DECIDES = $(UNIT)/watchdog $(patsubst %,$(UNIT)/driver/test_%.py,cia402 axis stall release_test state_machine state_machine_way_down fault_reset standstill braking) \
   $(UNIT)/chain/test_layouts_agree.py $(UNIT)/runtime/test_latch_record.py
 
 .PHONY: evidence-tests

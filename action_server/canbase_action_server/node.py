@@ -43,7 +43,7 @@ from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_num
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_config.robot import Robot
 from canbase_runtime.chain_topics import CHAIN, Use
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import EventLog, Journal
 from canbase_runtime.log_budget import LogBudget
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.message_reader import MessageReader
@@ -80,7 +80,7 @@ class DriveDistanceServer(Node):
         self._robot = robot
         self._own_source = robot.mux.action_source
         self._goal_queue = GoalQueue(robot)
-        self._voice = Voice(self.get_logger(), Journal("drive_distance_server"))
+        self._event_log = EventLog(self.get_logger(), Journal("drive_distance_server"))
         self._budgets = {step: LogBudget() for step in OF_REQUESTS}
         self._inputs = Inputs()
         self._states = {self.resolve_topic_name(row.topic): row for row in CHAIN if row.use is Use.STATE}
@@ -134,7 +134,7 @@ class DriveDistanceServer(Node):
         self._goal_queue.fail(error, time.monotonic())
         self.shut_down()
         for line in "".join(traceback.format_exception(error)).splitlines():
-            self._voice.tell(line, Priority.ERROR, robot=self._robot.name)
+            self._event_log.write(line, Priority.ERROR, robot=self._robot.name)
 
     def look_at_the_clock(self, now_s: float) -> None:
         """Call at least every 0.1 s: a pause of this process is found by it."""
@@ -301,7 +301,7 @@ class DriveDistanceServer(Node):
     def _write_log(self, step: GoalStep, uuid: str | None, fields: dict[str, Any], priority: Priority) -> None:
         text = json.dumps({"uuid": uuid, "step": step.value, **fields})
         told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
-        self._voice.tell(text, priority, robot=self._robot.name, goal=uuid, step=step.value, **told)
+        self._event_log.write(text, priority, robot=self._robot.name, goal=uuid, step=step.value, **told)
 
     def _log_phase(self, uuid: str | None, before: GoalPhase, cycle: Cycle) -> None:
         if self._goal_queue.phase is GoalPhase.STOPPING:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 
-class Cause(Enum):
+class DriverCause(Enum):
     """What the state machine found. The value is the word that people and topics see."""
 
     NONE = "none"
@@ -49,14 +49,14 @@ class Cause(Enum):
 
 
 _USUAL = (
-    Cause.NONE,
-    Cause.BOOTING,
-    Cause.PREPARING,
-    Cause.NO_RECORD,
-    Cause.ENABLING,
-    Cause.SHUTDOWN,
-    Cause.NOT_CONFIGURED,
-    Cause.INACTIVE,
+    DriverCause.NONE,
+    DriverCause.BOOTING,
+    DriverCause.PREPARING,
+    DriverCause.NO_RECORD,
+    DriverCause.ENABLING,
+    DriverCause.SHUTDOWN,
+    DriverCause.NOT_CONFIGURED,
+    DriverCause.INACTIVE,
 )
 
 
@@ -64,6 +64,6 @@ _USUAL = (
 class Finding:
     """Why there is no power: the cause, one sentence with the values, and what ends it."""
 
-    cause: Cause = Cause.NONE
+    cause: DriverCause = DriverCause.NONE
     detail: str = ""
     clears_on: str = ""

@@ -111,7 +111,7 @@ class PowerGoal(Enum):
     """Operation enabled."""
     READY = "ready"
     """Switched on: no torque, but nothing that forbids it either."""
-    LET_GO = "let go"
+    RELEASE = "let go"
     """Switched on, from operation enabled: for a moment without torque."""
     QUICK_STOP = "quick stop"
     """Down the ramp 6085h and then, with 605Ah = 2, to switch on disabled."""
@@ -142,7 +142,7 @@ COMMANDS: dict[PowerGoal, dict[DriveState | None, Command]] = {
     PowerGoal.OFF: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE),
     PowerGoal.ON: _UP,
     PowerGoal.READY: _READY,
-    PowerGoal.LET_GO: _READY | {DriveState.OPERATION_ENABLED: Command.SWITCH_ON},
+    PowerGoal.RELEASE: _READY | {DriveState.OPERATION_ENABLED: Command.SWITCH_ON},
     PowerGoal.QUICK_STOP: dict.fromkeys(_STATES, Command.QUICK_STOP),
     PowerGoal.RESET: dict.fromkeys(_STATES, Command.DISABLE_VOLTAGE) | {DriveState.FAULT: Command.FAULT_RESET},
 }

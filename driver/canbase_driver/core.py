@@ -16,7 +16,7 @@ from canbase_config import stopping
 from canbase_config.commissioned import without_proof
 from canbase_config.robot import DRIVER_NODE_ID, Robot
 from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
-from canbase_driver.causes import Cause, Finding
+from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import (
     EMCY,
@@ -33,18 +33,18 @@ from canbase_driver.cia402 import PowerGoal
 from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.canopen_node import CanopenNode
 from canbase_driver.drives.drive_group import Drives
-from canbase_driver.drives.let_go import LetGo
 from canbase_driver.drives.odometry_feed import OdometryFeed
+from canbase_driver.drives.release_test import ReleaseTest
 from canbase_driver.motion.braking import Braking
 from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import Pose2D
-from canbase_driver.motion.velocity_command import Command
+from canbase_driver.motion.velocity_command import VelocityCommand
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.bus_health import BusReport
 from canbase_driver.supervision.cycle_stats import CycleStats
-from canbase_driver.supervision.fault_reset import Outcome
-from canbase_driver.supervision.latch import PowerRecord, allowed_before_the_start, found_before_the_start
+from canbase_driver.supervision.fault_reset import RequestOutcome
+from canbase_driver.supervision.latch import PowerRecord, allowed_before_the_start, finding_before_the_start
 from canbase_driver.supervision.lifecycle import Aim, Lifecycle
 from canbase_driver.supervision.phases import NO_POWER, Drive, Orders
 from canbase_driver.supervision.reset_run import ResetRun
@@ -71,11 +71,11 @@ Handler = Callable[[Frame, float], bool]
 class DriverCore:
     """The whole driver as one object. Time is an argument [s, monotonic]."""
 
-    def __init__(self, robot: Robot, aim: Aim = Aim.ACTIVE, found: Found | None = None) -> None:
-        """`aim`: how far it goes by itself. `found`: the record of its stops at the start; None: no record is kept,
+    def __init__(self, robot: Robot, aim: Aim = Aim.ACTIVE, on_disk: Found | None = None) -> None:
+        """`aim`: how far it goes by itself. `on_disk`: the record of its stops at the start; None: no record is kept,
         which is for virtual time alone."""
         self._robot = robot
-        self._readiness = Lifecycle(robot, aim, allowed_before_the_start(found))
+        self._readiness = Lifecycle(robot, aim, allowed_before_the_start(on_disk))
         self._period_s = 1.0 / robot.rates.control_hz
         self._drives = Drives(robot)
         self._sync = SyncProducer(robot.bus.sync_counter)
@@ -83,12 +83,12 @@ class DriverCore:
         self._standstill_s = stopping.standstill_s(robot)
         self._track_m, self._feedback_s = robot.base.track_m, robot.timeouts.feedback_s
         self._heartbeat_s = robot.timeouts.drive_heartbeat_s / HEARTBEATS_PER_TIMEOUT - self._period_s / 2.0
-        self._state_machine = StateMachine(Braking(robot), self._standstill_s, found_before_the_start(found))
-        self._record = PowerRecord(found)
-        self._let_go = LetGo(robot)
+        self._state_machine = StateMachine(Braking(robot), self._standstill_s, finding_before_the_start(on_disk))
+        self._record = PowerRecord(on_disk)
+        self._release_test = ReleaseTest(robot)
         self._limiter = Limiter(robot.limits, robot.base.track_m)
         self._feed = OdometryFeed(self._drives, robot)
-        self._command = Command(robot.timeouts.command_s)
+        self._command = VelocityCommand(robot.timeouts.command_s)
         self._stats = CycleStats(self._period_s)
         self._motion = MotionState.AT_REST
         self._eased_at = math.inf
@@ -130,7 +130,7 @@ class DriverCore:
     @property
     def lets_go(self) -> bool:
         """It is ENABLED, and has taken the power off for a moment, as a stand with torque is no proof of itself."""
-        return self._let_go.active
+        return self._release_test.active
 
     @property
     def record(self) -> Record:
@@ -155,9 +155,9 @@ class DriverCore:
         self.frames_dropped += not take(frame, now_s)
         return self._drives.go_on(node, now_s) if node is not None else []
 
-    def on_command(self, twist: Twist2D, received_at: float) -> bool:
+    def accept_velocity_command(self, twist: Twist2D, received_at: float) -> bool:
         """Take a velocity command with its receive time. False, and counted: it was not finite."""
-        return self._command.take(twist, received_at)
+        return self._command.accept(twist, received_at)
 
     def on_bus(self, problem: str, now_s: float, report: BusReport = HEALTHY) -> None:
         """The bus failed (a sentence), or works (empty); after a failure every node is booted again."""
@@ -169,7 +169,7 @@ class DriverCore:
     def on_suspend(self, now_s: float) -> None:
         """The computer was suspended, which no age contains: nothing received counts, every node boots again, and a
         reset on its way is broken off."""
-        self._reset.end(Outcome(False, "broken off: the computer was suspended; reset again"))
+        self._reset.end(RequestOutcome(False, "broken off: the computer was suspended; reset again"))
         self._lose_all("was not supervised while the computer was suspended", now_s)
 
     def _lose_all(self, why: str, now_s: float) -> None:
@@ -179,36 +179,38 @@ class DriverCore:
     def request_stop(self) -> None:
         """Ramp to a stand, take the power away, stay there until a reset. A reset on its way is broken off."""
         self._stop_requested = True
-        self._reset.end(Outcome(False, "broken off: service motor_driver/stop"))
+        self._reset.end(RequestOutcome(False, "broken off: service motor_driver/stop"))
 
     def request_shutdown(self) -> None:
         """Ramp to a stand, take the power away, then be `finished`. A reset on its way is broken off."""
         self._shutdown_requested = True
-        self._reset.end(Outcome(False, "broken off: motor_driver is shutting down"))
+        self._reset.end(RequestOutcome(False, "broken off: motor_driver is shutting down"))
 
-    def request_reset(self, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
+    def request_reset(self, now_s: float, on_outcome: Callable[[RequestOutcome], None]) -> None:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
         if self._reset.begin(self._situation(now_s), self._state_machine.state in NO_POWER, now_s, on_outcome):
             for node in self._drives.nodes:
                 node.clear_lost_heartbeat(now_s)
 
-    def request_aim(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
+    def request_aim(self, aim: Aim, now_s: float, on_outcome: Callable[[RequestOutcome], None]) -> None:
         """Go so far; `on_outcome` is called once, when it is there or has failed. What takes power away is obeyed in a
         shutdown too: the record then keeps it off over the next start."""
         if self._shutdown_requested and aim >= self._readiness.aim:
-            on_outcome(Outcome(False, "refused: motor_driver is shutting down"))
+            on_outcome(RequestOutcome(False, "refused: motor_driver is shutting down"))
         else:
             self._readiness.request(aim, now_s, on_outcome)
 
-    def set_pose(self, pose: Pose2D, now_s: float) -> Outcome:
+    def set_pose(self, pose: Pose2D, now_s: float) -> RequestOutcome:
         """The odometry goes on from `pose`, with the covariance of a fresh start. Refused in motion."""
         commanded = self._command.motion(now_s)
         if not all(abs(value) <= FARTHEST for value in (pose.x_m, pose.y_m, pose.yaw_rad)):
-            return Outcome(False, f"refused: {pose}: expected x, y and yaw between ±{FARTHEST:.0f} (m, rad)")
+            return RequestOutcome(False, f"refused: {pose}: expected x, y and yaw between ±{FARTHEST:.0f} (m, rad)")
         if commanded or not self._drives.stand(now_s):
-            return Outcome(False, f"refused: {commanded or self._drives.turning(now_s)}; a pose is set at a standstill")
+            return RequestOutcome(
+                False, f"refused: {commanded or self._drives.turning(now_s)}; a pose is set at a standstill"
+            )
         self._feed.set_pose(pose)
-        return Outcome(
+        return RequestOutcome(
             True, f"odometry continues from x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, yaw {pose.yaw_rad:.3f} rad"
         )
 
@@ -233,16 +235,16 @@ class DriverCore:
         frames += self._stop_by_sdo(orders, situation, now_s)
         if self._motion.twist != Twist2D.ZERO or situation.standstill:
             self._eased_at = now_s
-        let_go = self._readiness.step(situation, self.state, self.finding, now_s, self._record.unrecorded)
-        if let_go or (self.finished and not self._readiness.released):
-            frames += self._end_communication(let_go, now_s)
+        releases = self._readiness.step(situation, self.state, self.finding, now_s, self._record.unrecorded)
+        if releases or (self.finished and not self._readiness.released):
+            frames += self._end_communication(releases, now_s)
         return frames
 
-    def _end_communication(self, let_go: bool, now_s: float) -> list[Frame]:
+    def _end_communication(self, releases: bool, now_s: float) -> list[Frame]:
         """Reset communication forgets 1016h: a drive must not report a lost heartbeat after an orderly end. One that
         may have power keeps it, and stops by the missing heartbeat."""
         off = [node.node_id for node in self._drives.nodes if node.is_off(now_s)]
-        for node in self._drives.nodes if let_go else ():
+        for node in self._drives.nodes if releases else ():
             node.release(now_s)
         return [nmt(NmtCommand.RESET_COMMUNICATION, node_id) for node_id in off]
 
@@ -259,7 +261,7 @@ class DriverCore:
         began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
         continued = before is DriverState.STOPPING and state in (DriverState.STOPPING, DriverState.LATCHED)
         if (began and not continued) or (continued and self._state_machine.latches and not latched_before):
-            by = "watchdog" if finding.cause is Cause.WATCHDOG_TRIPPED else "motor_driver"
+            by = "watchdog" if finding.cause is DriverCause.WATCHDOG_TRIPPED else "motor_driver"
             latches = self._state_machine.latches
             self.stops.append(StopRecord(by, finding.cause.value, finding.detail, latches, finding.clears_on, now_s))
         if state is not before and state is DriverState.ENABLED:
@@ -268,8 +270,8 @@ class DriverCore:
 
     def _setpoints(self, orders: Orders, now_s: float, dt_s: float) -> list[Frame]:
         started = [node for node in self._drives.nodes if node.takes_pdos]
-        self._hold_or_let_go(orders, now_s)
-        if orders.drive is Drive.ZERO or self._let_go.active:
+        self._hold_or_release(orders, now_s)
+        if orders.drive is Drive.ZERO or self._release_test.active:
             self._motion = MotionState.AT_REST
         else:
             target = self._command.target(now_s) if orders.drive is Drive.FOLLOW else Twist2D.ZERO
@@ -277,19 +279,19 @@ class DriverCore:
             self._motion = self._limiter.step(self._motion, target, dt_s, emergency=hard)
         if self._bus_problem or not started:
             return []
-        goal = self._let_go.goal(now_s) if self._let_go.active else orders.goal
+        goal = self._release_test.goal(now_s) if self._release_test.active else orders.goal
         if self._reset.fault_reset_bit:  # to an axis without a fault RESET is OFF
             goal = PowerGoal.RESET
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._track_m)
         frames = [frame for node in started for frame in node.setpoints(goal, left_mps, right_mps)]
         return [*frames, self._sync.next()]
 
-    def _hold_or_let_go(self, orders: Orders, now_s: float) -> None:
+    def _hold_or_release(self, orders: Orders, now_s: float) -> None:
         if orders.drive is not Drive.FOLLOW:
-            self._let_go.end(ramps=orders.drive is Drive.RAMP)
+            self._release_test.end(ramps=orders.drive is Drive.RAMP)
             return
         rests = self._drives.rest(*wheel_speeds(self._command.target(now_s), self._track_m))
-        self._let_go.step(self._drives.axes, rests, now_s)
+        self._release_test.step(self._drives.axes, rests, now_s)
 
     def _stop_by_sdo(self, orders: Orders, situation: Situation, now_s: float) -> list[Frame]:
         """While a watchdog lives its ladder does this, and takes an SDO of ours for another master's."""
@@ -334,7 +336,7 @@ class DriverCore:
             fault="" if enabled else drives.fault(),
             absent="" if ready else drives.absent(),
             silent=drives.silent(now_s, self._sync_since),
-            disabled="" if enabled or self._let_go.excuses(now_s) else drives.disabled(),
+            disabled="" if enabled or self._release_test.excuses(now_s) else drives.disabled(),
             unprepared="" if enabled else drives.unprepared(),
             unarmed=self._record.unarmed or self._watchdog.unarmed,
             watchdog=watchdog,

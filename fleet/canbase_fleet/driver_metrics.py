@@ -8,7 +8,7 @@ from typing import Any, Final
 from prometheus_client.core import Metric
 
 from canbase_config.robot import Robot
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.cia402 import DriveState
 from canbase_driver.supervision.bus_health import ControllerState
 from canbase_fleet.columns import Column, metrics, one_of
@@ -76,7 +76,7 @@ def driver_metrics(message: Any, robot: Robot) -> Iterator[Metric]:
         (state.word for state in DriverState),
         driver_state(message.state).word,
     )
-    causes = [_word(cause.value) for cause in Cause]
+    causes = [_word(cause.value) for cause in DriverCause]
     yield one_of("driver_cause", "Why the drives have no power; none: they have.", causes, _word(message.cause))
     views = [view.value for view in WatchdogView]
     yield one_of("watchdog_state", "The watchdog as the driver sees it.", views, watchdog_view(message.watchdog).value)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from canbase_config.robot import Robot
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.supervision.bus_health import ControllerState
 from canbase_fleet.robot_view import DRIVER, MUX, SAFETY, RobotView
 from canbase_fleet.safety_state import has_field
@@ -27,8 +27,8 @@ FATAL, WARNING = "FATAL", "WARNING"
 PROCESSES: Final = {DRIVER: "canbase serve driver", SAFETY: "canbase serve velocity", MUX: "canbase serve velocity"}
 STARTING: Final = (DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING)
 PASSING: Final = (
-    *(Cause.NONE, Cause.BOOTING, Cause.PREPARING, Cause.NO_RECORD, Cause.ENABLING),
-    *(Cause.COMMAND_NOT_ZERO, Cause.NOT_STANDING, Cause.RESETTING),
+    *(DriverCause.NONE, DriverCause.BOOTING, DriverCause.PREPARING, DriverCause.NO_RECORD, DriverCause.ENABLING),
+    *(DriverCause.COMMAND_NOT_ZERO, DriverCause.NOT_STANDING, DriverCause.RESETTING),
 )
 """They end without anybody who repairs something."""
 BROKEN: Final = SCAN_LOST | {
@@ -39,7 +39,7 @@ BROKEN: Final = SCAN_LOST | {
     StopCause.UNKNOWN,
 }
 """What the filter lacks."""
-_CAUSES: Final = {cause.value: cause for cause in Cause}
+_CAUSES: Final = {cause.value: cause for cause in DriverCause}
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from canbase_driver.causes import Cause as DriverCause
+from canbase_driver.causes import DriverCause
 from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED
 from canbase_recording.cause import Found
 from canbase_recording.notes import FilterNote

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from canbase_driver.causes import Cause as DriverCause
+from canbase_driver.causes import DriverCause
 from canbase_recording import evidence_bus as bus
 from canbase_recording import evidence_drive as drive
 from canbase_recording import evidence_masters as masters

@@ -28,7 +28,7 @@ class Journal:
         self._path = path if environment.get(UNDER_SYSTEMD) else ""
         self._part = part
 
-    def tell(self, message: str, priority: Priority, **fields: object) -> None:
+    def write(self, message: str, priority: Priority, **fields: object) -> None:
         """One entry; a field `cause` is CANBASE_CAUSE there."""
         if not self._path:
             return
@@ -61,27 +61,27 @@ class Logger(Protocol):
         """A line of severity INFO."""
 
 
-VOICE_BURST, VOICE_PER_S = 200.0, 20.0
+EVENT_LOG_BURST, EVENT_LOG_PER_S = 200.0, 20.0
 """Lines of one part, far more than any operation writes."""
 
 
-class Voice:
+class EventLog:
     """The log of one part: each sentence is a line of ROS's log and a journal entry with priority and fields."""
 
     def __init__(self, logger: Logger, journal: Journal) -> None:
         self._logger, self._journal = logger, journal
-        self._budget = LogBudget(VOICE_BURST, VOICE_PER_S)
+        self._budget = LogBudget(EVENT_LOG_BURST, EVENT_LOG_PER_S)
 
-    def tell(self, sentence: str, priority: Priority, **fields: object) -> None:
+    def write(self, sentence: str, priority: Priority, **fields: object) -> None:
         """One sentence, which is one line whatever is in it. ROS knows no notice: it is an INFO there. A flood of them
         (a lock that is set and released by each message) is cut off, and counted; an error is always written."""
         omitted = 0 if priority is Priority.ERROR else self._budget.take(time.monotonic())
         if omitted is None:
             return
         if omitted:
-            self._logger.warning(f"{omitted} lines omitted: more than {VOICE_PER_S:g} each second")
+            self._logger.warning(f"{omitted} lines omitted: more than {EVENT_LOG_PER_S:g} each second")
         sentence = printable(sentence, LINE_LENGTH)
-        self._journal.tell(sentence, priority, **fields)
+        self._journal.write(sentence, priority, **fields)
         if priority is Priority.ERROR:  # a call for each severity: rclpy holds a line of source to one
             self._logger.error(sentence)
         elif priority is Priority.WARNING:

@@ -134,31 +134,31 @@ def replaced(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
 def _link(name: str, folder: int, place: Path, make: int | None) -> str | None:
     """The target of a link; None: it is none. What does not exist is made, with the mode `make`."""
     try:
-        found = os.stat(name, dir_fd=folder, follow_symlinks=False)
+        status = os.stat(name, dir_fd=folder, follow_symlinks=False)
     except FileNotFoundError:
         if make is None:
             raise
         os.mkdir(name, make, dir_fd=folder)
         return None
-    if not stat.S_ISLNK(found.st_mode):
+    if not stat.S_ISLNK(status.st_mode):
         return None
-    if found.st_uid not in _trusted():
-        raise FolderError(f"the folder {place} is a link of user {found.st_uid}. Remove it")
+    if status.st_uid not in _trusted():
+        raise FolderError(f"the folder {place} is a link of user {status.st_uid}. Remove it")
     return os.readlink(name, dir_fd=folder)
 
 
-def _judge(found: os.stat_result, place: Path, *, last: bool) -> None:
+def _judge(status: os.stat_result, place: Path, *, last: bool) -> None:
     """Refuses a folder that another user could change. In one with the sticky bit a user moves only files of that user.
 
     Above the last one a group may write that is root's, or that by its number is its owner's own (umask 002).
     """
-    if found.st_uid not in _trusted():
+    if status.st_uid not in _trusted():
         raise FolderError(
-            f"the folder {place} belongs to user {found.st_uid}, this is user {os.geteuid()}: "
+            f"the folder {place} belongs to user {status.st_uid}, this is user {os.geteuid()}: "
             "that user could take its place. Choose a folder of this user"
         )
-    others = stat.S_IWOTH if not last and found.st_gid in (0, found.st_uid) else stat.S_IWGRP | stat.S_IWOTH
-    if found.st_mode & others and not found.st_mode & stat.S_ISVTX:
+    others = stat.S_IWOTH if not last and status.st_gid in (0, status.st_uid) else stat.S_IWGRP | stat.S_IWOTH
+    if status.st_mode & others and not status.st_mode & stat.S_ISVTX:
         raise FolderError(
             f"others may write to the folder {place}, and so take the place of what is in it. "
             f"Take that from them (chmod go-w {place}), or choose another folder"

@@ -26,7 +26,7 @@ from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_config.state_age import STATE_PERIOD_S
 from canbase_config.stopping import ramp
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import EventLog, Journal
 from canbase_runtime.latch_file import LatchKeeper
 from canbase_runtime.latch_record import Record
 from canbase_runtime.log_priority import Priority
@@ -75,7 +75,7 @@ class FilterNode(Node):
         super().__init__("safety_filter")
         refuse_sim_time(self, SetParametersResult)
         self._robot = robot
-        self._voice = Voice(self.get_logger(), Journal("safety_filter"))
+        self._event_log = EventLog(self.get_logger(), Journal("safety_filter"))
         self._receive_times = ReceiveTimes()
         self._request_times = ReceiveTimes.of_requests()
         self._moving_sources, self._note = moving_sources, note
@@ -175,13 +175,13 @@ class FilterNode(Node):
         """A change is ordered at once, so the next lease tells the watchdog."""
         now_s, limit = time.monotonic(), limits.effective
         fields = {"linear_mps": f"{limit.linear_mps:g}", "angular_radps": f"{limit.angular_radps:g}"}
-        self._voice.tell(f"speed limit {limit}, {how}", Priority.NOTICE, robot=self._robot.name, **fields)
+        self._event_log.write(f"speed limit {limit}, {how}", Priority.NOTICE, robot=self._robot.name, **fields)
         self._note("speed_limit", now_s, limit.linear_mps, limit.angular_radps, limits.by)
         self._filter.on_speed_limit(limit, limits.by)
         self._decide(now_s)
 
     def _refuse(self, why: str) -> None:
-        self._voice.tell(why, Priority.WARNING, robot=self._robot.name)
+        self._event_log.write(why, Priority.WARNING, robot=self._robot.name)
 
     def _on_estop(self, message: Bool) -> None:
         now_s = time.monotonic()
@@ -201,7 +201,7 @@ class FilterNode(Node):
         self._filter.on_estop_publishers(count, why)
         crowd = self._filter.estop_crowd
         if crowd and crowd != before:
-            self._voice.tell(crowd, Priority.ERROR, robot=self._robot.name)
+            self._event_log.write(crowd, Priority.ERROR, robot=self._robot.name)
 
     def _on_scan(self, config: ScanConfig, held: HeldPlacement, message: LaserScan) -> None:
         now_s, wall_s = time.monotonic(), time.time()
@@ -242,7 +242,7 @@ class FilterNode(Node):
             moving = list(self._moving_sources())
             self._note("reset", now_s, moving)
             response.success, response.message = self._filter.reset(moving, now_s)
-        self._voice.tell(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
+        self._event_log.write(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
         return response
 
     def _tick(self) -> None:
@@ -302,19 +302,19 @@ class FilterNode(Node):
             )
         )
         if report is not None:
-            self._voice.tell(report, Priority.WARNING, robot=self._robot.name)
+            self._event_log.write(report, Priority.WARNING, robot=self._robot.name)
 
     def _tell(self, decision: Decision, now_s: float) -> None:
         before = self._decision
         if is_told(before, decision):
             sentence, priority, fields = changed_order(decision)
-            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
+            self._event_log.write(sentence, priority, robot=self._robot.name, **fields)
         changed = decision.essence != before.essence
         if not changed and now_s - self._state_at_s < STATE_PERIOD_S:
             return
         inputs = self._told = self._filter.inputs(now_s)
         for sentence, priority, fields in self._drops.news(inputs.scans, now_s):
-            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
+            self._event_log.write(sentence, priority, robot=self._robot.name, **fields)
         message = messages.safety_state(
             decision, inputs, self._filter.clearances(now_s), self.get_clock().now().to_msg()
         )

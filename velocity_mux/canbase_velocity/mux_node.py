@@ -28,7 +28,7 @@ from canbase_config.robot import Robot
 from canbase_config.state_age import STATE_PERIOD_S
 from canbase_runtime.driver_state import driver_state
 from canbase_runtime.joint_command import Refusal, base_velocity
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import EventLog, Journal
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
@@ -76,7 +76,7 @@ class MuxNode(Node):
         self._refuse_own_topics()
         self._note = note
         self._follower: Follower | None = None
-        self._voice = Voice(self.get_logger(), Journal("velocity_mux"))
+        self._event_log = EventLog(self.get_logger(), Journal("velocity_mux"))
         self._receive_times = ReceiveTimes()
         self._mux = Mux(
             robot.mux.sources,
@@ -201,7 +201,7 @@ class MuxNode(Node):
         for found in foreign:
             if found not in before:
                 told = {"topic": found.topic, "node": found.node}
-                self._voice.tell(found.sentence, found.priority, robot=self._robot.name, **told)
+                self._event_log.write(found.sentence, found.priority, robot=self._robot.name, **told)
         self._note("foreign", now_s, [asdict(found) for found in foreign])
         self._mux.on_foreign(foreign)
         for topic, kind in self._heard.items():
@@ -242,7 +242,7 @@ class MuxNode(Node):
             self._states.publish(mux_state(decision, stamp))
             self._state_at_s = now_s
         for sentence, priority, fields in changes(self._decision, decision):
-            self._voice.tell(sentence, priority, robot=self._robot.name, **fields)
+            self._event_log.write(sentence, priority, robot=self._robot.name, **fields)
         self._decision = decision
 
     def _diagnose(self) -> None:

@@ -159,7 +159,7 @@ def test_a_watchdog_that_hears_another_one_never_sends(watched: Watched) -> None
     """On another computer the name of the first one is not taken: here it is left out."""
     code = (
         "import sys; from canbase_watchdog import main, single_instance; "
-        "single_instance.take = single_instance.take_record = lambda _: open('/dev/null'); "
+        "single_instance.hold_bus = single_instance.hold_record = lambda _: open('/dev/null'); "
         "sys.exit(main.main(sys.argv[1:]))"
     )
     other = replace(watched.config, lease_socket=f"{watched.config.lease_socket}2")

@@ -16,13 +16,13 @@ from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
 from canbase_campaign.disk import StopDisk, WatchdogDisk
 from canbase_driver import core
-from canbase_driver.causes import Cause
-from canbase_driver.drives.let_go import LetGo, Push
-from canbase_driver.motion import velocity_command as command
+from canbase_driver.causes import DriverCause
+from canbase_driver.drives.release_test import ReleaseTest, TorqueEvidence
 from canbase_driver.motion.braking import Braking
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.limiter import Limiter, MotionState
 from canbase_driver.motion.odometry import WheelTravel
+from canbase_driver.motion.velocity_command import VelocityCommand
 from canbase_driver.supervision import fault_reset, state_machine, watchdog_link
 from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS, Blocker, Hazard
 from canbase_driver.supervision.lifecycle import Aim
@@ -70,7 +70,7 @@ def _trip(cause: TripCause) -> Callable[[], None]:
     return _drop(policy, lambda row: getattr(row, "cause", None) is not cause)
 
 
-def _reason(kind: type[Blocker | Hazard], cause: Cause) -> Callable[[], None]:
+def _reason(kind: type[Blocker | Hazard], cause: DriverCause) -> Callable[[], None]:
     def stays(row: Any) -> bool:
         reason = getattr(row, "reason", row)
         return not (isinstance(reason, kind) and reason.cause is cause)
@@ -210,7 +210,7 @@ def _at_once(
     return MotionState(Twist2D.ZERO if emergency else self.limit(target))
 
 
-def _name(cause: Cause) -> str:
+def _name(cause: DriverCause) -> str:
     return cause.value.replace(" ", "_")
 
 
@@ -253,12 +253,12 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "watchdog:latch": _no_latch,
     **{f"driver:{_name(row.cause)}": _reason(Hazard, row.cause) for row in HAZARDS},
     "driver:latch": _driver_forgets,
-    "driver:watchdog_missing": _brakes_softly_too(_reason(Hazard, Cause.WATCHDOG_MISSING)),
+    "driver:watchdog_missing": _brakes_softly_too(_reason(Hazard, DriverCause.WATCHDOG_MISSING)),
     "driver:asks_for_watchdog": _brakes_softly_too(
         _put(watchdog_link.WatchdogLink, "view", lambda self, now_s: (WatchdogView.OK, ""))
     ),
-    "driver:command_timeout": _put(command.Command, "_fresh", lambda self, now_s: self._command.within(1e9, now_s)),
-    "driver:zero_before_motion": _put(command.Command, "await_zero", lambda self: None),
+    "driver:command_timeout": _put(VelocityCommand, "_fresh", lambda self, now_s: self._command.within(1e9, now_s)),
+    "driver:zero_before_motion": _put(VelocityCommand, "await_zero", lambda self: None),
     "driver:command_is_finite": _put(Twist2D, "is_finite", property(lambda self: True)),
     "driver:odometry_jump_guard": _put(WheelTravel, "_is_near", lambda self, from_raw, raw, cycles: True),
     "driver:stop_record": _no_records,
@@ -269,8 +269,8 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "drives:heartbeat_consumer": _put(HeartbeatConsumer, "tick", lambda self, now_s: None),
     "mux:neutral_start": _put(neutral.Arming, "armed", property(lambda self: True)),
     "mux:lock_publishers": _put(lock.Lock, "published_by", lambda self, nodes: None),
-    "driver:lets_go": _put(LetGo, "_is_due", lambda self, wheels: False),
-    "driver:unasked_torque": _put(Push, "_note_change", lambda self, begins, elapsed_s: None),
+    "driver:release_test": _put(ReleaseTest, "_is_due", lambda self, wheels: False),
+    "driver:unasked_torque": _put(TorqueEvidence, "_note_change", lambda self, begins, elapsed_s: None),
     "mux:timeout": _put(mux._Source, "fresh", lambda self, now_s: self.command.within(1e9, now_s)),
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),

@@ -150,7 +150,7 @@ NEEDS: tuple[Need, ...] = (
     Need("driver:reset_needs_zero", _HELD, "mux:neutral_start+driver:zero_before_motion+power:command_not_zero"),
     Need("driver:command_is_finite", ("straight_to_cmd_vel",)),
     Need("driver:odometry_jump_guard", ("frozen_encoder",), f"{_MOTION}+watchdog:motion_outside"),
-    Need("driver:lets_go", ("encoder_lost", "stick_tapped"), f"watchdog:power_at_stand+{_MISSING}",
+    Need("driver:release_test", ("encoder_lost", "stick_tapped"), f"watchdog:power_at_stand+{_MISSING}",
          quiet=True),
     Need("driver:unasked_torque", ("encoder_ghost",), "watchdog:ghost+watchdog:unasked_torque", quiet=True),
     Need("driver:stop_record", ("driver_dies", "drive_fault", "all_processes_restart")),

@@ -12,7 +12,7 @@ from canbase_campaign.outside import Surroundings
 from canbase_campaign.robots import campaign_robot
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_runtime.driver_state import DriverState
 from canbase_velocity.neutral import Arming
 from canbase_velocity.twist import ZERO, Twist
@@ -47,7 +47,7 @@ class Hand:
 
     def wait_enabled(self) -> None:
         """Until the drives have power; a reset where one is needed."""
-        outcomes: list[Outcome] = []
+        outcomes: list[RequestOutcome] = []
         for _ in range(round(READY_S / 0.1)):
             self.run(0.1)
             if self.world.driver.core.state is DriverState.ENABLED:

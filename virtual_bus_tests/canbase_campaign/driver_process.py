@@ -11,7 +11,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
 from canbase_velocity.twist import ZERO, Twist
@@ -78,7 +78,7 @@ class DriverProcess(Process):
 
     def begin(self) -> None:
         """A new core: nothing is booted, and its record decides what is latched."""
-        self.core = DriverCore(self._robot, found=self.disk.found())
+        self.core = DriverCore(self._robot, on_disk=self.disk.found())
         self.asked = self.asked if self.asked == "deactivate" else ""  # whatever the record says
         rates = self._robot.rates
         self._period_s, self._status_s = 1.0 / rates.control_hz, 1.0 / rates.status_hz
@@ -90,12 +90,12 @@ class DriverProcess(Process):
         self._suspended_s = self.clock.suspended_s
         self.every(self._period_s, self._on_cycle)
 
-    def reset(self, on_outcome: list[Outcome]) -> None:
+    def reset(self, on_outcome: list[RequestOutcome]) -> None:
         """Service motor_driver/reset; there is no answer while the process does not run."""
         if self.running:
             self.core.request_reset(self.clock.now_s, lambda outcome: self._on_reset(outcome, on_outcome))
 
-    def _on_reset(self, outcome: Outcome, on_outcome: list[Outcome]) -> None:
+    def _on_reset(self, outcome: RequestOutcome, on_outcome: list[RequestOutcome]) -> None:
         self.asked = "" if outcome.done and self.asked == "stop" else self.asked
         on_outcome.append(outcome)
 
@@ -136,7 +136,7 @@ class DriverProcess(Process):
         if self.keeps_motion and twist.is_zero:
             twist = self._moves
         self._moves = twist
-        self.core.on_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now_s)
+        self.core.accept_velocity_command(Twist2D(twist.linear_mps, twist.angular_radps), self.clock.now_s)
 
     def _on_cycle(self) -> None:
         now_s = self.clock.now_s

@@ -12,7 +12,7 @@ from canbase_campaign.scanner import Scanner
 from canbase_campaign.wall_place import far_enough_m
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_velocity.clearance import NOWHERE, Points
 from canbase_velocity.twist import Twist
 
@@ -28,7 +28,7 @@ class Outside:
     def __init__(self, world: World, around: Surroundings, plan: Plan, start: float) -> None:
         self._world, self._start = world, start
         self._topics = {name: source.topic for name, source in world.robot.mux.sources.items()}
-        self.resets: list[Outcome] = []
+        self.resets: list[RequestOutcome] = []
         self.asked_at = -math.inf
         """When the operator last requested one."""
         around.reset = self.reset

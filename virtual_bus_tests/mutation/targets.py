@@ -116,7 +116,7 @@ TARGETS = (
     _driver("drives/axis", then=("driver/canopen_node", "driver/core")),
     _driver("drives/standstill", "driver/standstill", "driver/standstill_limits", then=("driver/core",)),
     _driver("drives/stall", then=("driver/core",)),
-    _driver("drives/let_go", then=("chain/dead_encoder_at_a_stand",)),
+    _driver("drives/release_test", then=("chain/dead_encoder_at_a_stand",)),
     _driver("motion/limiter", then=("driver/limiter_properties", "driver/braking", "velocity/ramp")),
     _driver("motion/braking"),
     _driver("motion/velocity_command", then=("driver/core",)),

@@ -13,13 +13,13 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from canbase_driver.ros.managed_node import ManagedNode
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from support.ros_harness import TestNode
 
 pytestmark = pytest.mark.ros
 
-DONE, FAILED = Outcome(True, "done"), Outcome(False, "not confirmed in time")
+DONE, FAILED = RequestOutcome(True, "done"), RequestOutcome(False, "not confirmed in time")
 
 
 class PlayedLoop:
@@ -27,13 +27,13 @@ class PlayedLoop:
 
     def __init__(self, aim: Aim) -> None:
         self.aimed_at = self._before = aim
-        self._on_outcome: list[Callable[[Outcome], None]] = []
+        self._on_outcome: list[Callable[[RequestOutcome], None]] = []
 
-    def aim(self, aim: Aim, on_outcome: Callable[[Outcome], None]) -> None:
+    def aim(self, aim: Aim, on_outcome: Callable[[RequestOutcome], None]) -> None:
         self._before, self.aimed_at = self.aimed_at, aim
         self._on_outcome.append(on_outcome)
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, outcome: RequestOutcome) -> None:
         if not outcome.done and self.aimed_at > self._before:
             self.aimed_at = self._before
         self._on_outcome.pop()(outcome)
@@ -74,7 +74,7 @@ class Rig:
         self._spin(lambda: answer.done() or self.loop.changing)
         return answer
 
-    def change(self, transition: int, outcome: Outcome = DONE) -> bool:
+    def change(self, transition: int, outcome: RequestOutcome = DONE) -> bool:
         """The answer to a transition that ends with `outcome`."""
         answer = self.ask(transition)
         assert not answer.done()

@@ -39,7 +39,7 @@ DIGITS = 3
 IGNORED = {
     "a count that is shown alone": (
         "DriverCore._stats DriverCore.frames_dropped DriverCore.stops Watchdog.trips "
-        "Watchdog._longest_gap_s Watchdog._counters_due _Source.received _Source.refused Command.refused "
+        "Watchdog._longest_gap_s Watchdog._counters_due _Source.received _Source.refused VelocityCommand.refused "
         "LeaseBook.refused Observer.dropped BusReport.dropped SdoClient.dropped WatchdogLink.counters "
         "WatchdogState.lease_age_ms"
     ),
@@ -60,10 +60,10 @@ IGNORED = {
     "a place on an endless way: the steps between two samples decide, and both are those of now": (
         "DriverCore._feed Axis.travel Axis.encoder_offset Stillness._travel_m StoppingDistance._travel_m "
         "Plausibility._counts Plausibility._counts_before TorqueWatch._counts TorqueWatch._counts_before "
-        "StandstillWatch._counts Push._seen_m"
+        "StandstillWatch._counts TorqueEvidence._travel_m"
     ),
     "a place that is at most one sample from the newest one, or the same at standstill": (
-        "Stillness._anchor_m StoppingDistance._from_m Push._counted_m"
+        "Stillness._anchor_m StoppingDistance._from_m TorqueEvidence._counted_m"
     ),
     "the motion between two scans: the scanner of a small world sees nothing": "ExpectedMotion._poses",
     "the same object for ever, or told elsewhere: dictionaries, disks": (

@@ -13,7 +13,7 @@ from canbase_campaign.robots import campaign_robot
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.supervision import state_machine
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_velocity.twist import ZERO, Twist
 from small_worlds.events import EVENTS, EVER_S, Event
@@ -81,7 +81,7 @@ class SmallWorld:
             "watchdog": self.world.watchdog.disk,
             "velocity": self.world.velocity.disk,
         }
-        self.resets: list[Outcome] = []
+        self.resets: list[RequestOutcome] = []
         self.freed = 0
         self.asked_s: list[float] = []
         self.held = self._talks = False

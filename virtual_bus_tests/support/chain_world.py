@@ -16,7 +16,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.cia402.states import State
@@ -164,7 +164,7 @@ class World:
 
     def start_driver(self) -> None:
         """A new driver process, without any state of the one before."""
-        self.driver, self.ticks = DriverCore(self.robot, found=self.disk.found() if self._keeps else None), []
+        self.driver, self.ticks = DriverCore(self.robot, on_disk=self.disk.found() if self._keeps else None), []
         self.resume_cycles()
 
     def start_watchdog(self) -> None:
@@ -199,16 +199,16 @@ class World:
         assert self.truth.standing_s > 0.5, self.truth
         return self.now_s - self.truth.standing_s - start
 
-    def reset(self) -> Outcome:
+    def reset(self) -> RequestOutcome:
         """Request a reset of the driver and let it run to its end."""
-        outcomes: list[Outcome] = []
+        outcomes: list[RequestOutcome] = []
         self.core.request_reset(self.now_s, outcomes.append)
         assert self.run(12.0, lambda: bool(outcomes)), "the reset never ended"
         return outcomes[0]
 
-    def go(self, aim: Aim) -> Outcome:
+    def go(self, aim: Aim) -> RequestOutcome:
         """Order the driver to this aim and let it get there, or fail."""
-        outcomes: list[Outcome] = []
+        outcomes: list[RequestOutcome] = []
         self.core.request_aim(aim, self.now_s, outcomes.append)
         assert self.run(20.0, lambda: bool(outcomes)), "the change never ended"
         return outcomes[0]
@@ -276,7 +276,7 @@ class World:
         elif self.command is not None and self.command.is_finite:
             self._ordered = self.command
         if self.driver is not None and self.command is not None:
-            self.driver.on_command(self.command, self.now_s)
+            self.driver.accept_velocity_command(self.command, self.now_s)
         if self.leases and self.watchdog is not None:
             self._sequence += 1
             ordered = Twist(self._ordered.linear_mps, self._ordered.angular_radps)

@@ -17,7 +17,7 @@ from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.stop_history import StopRecord
 from canbase_runtime.driver_state import DriverState
 from canbase_sim.faults import apply
@@ -137,7 +137,7 @@ class Driver:
         end = time.monotonic() + within_s
         self.around.ordered = twist
         while time.monotonic() < end:
-            self.loop.command(twist, time.monotonic())
+            self.loop.queue_velocity_command(twist, time.monotonic())
             snapshot, stops = self.loop.next_snapshot(timeout_s=0.02)
             self.stops += stops
             if snapshot is not None:
@@ -191,9 +191,9 @@ class Driver:
         """Service motor_driver/stop; its answer is not waited for."""
         self.loop.stop(lambda _outcome: None)
 
-    def try_reset(self, within_s: float = 20.0) -> Outcome:
+    def try_reset(self, within_s: float = 20.0) -> RequestOutcome:
         """Reset; how it ended."""
-        outcomes: list[Outcome] = []
+        outcomes: list[RequestOutcome] = []
         self.loop.reset(outcomes.append)
         deadline_s = time.monotonic() + within_s
         while not outcomes and time.monotonic() < deadline_s:

@@ -61,7 +61,7 @@ class TimedBus:
 
     def _queue_up_what_is_due(self) -> None:
         if self._is_due("command", COMMAND_PERIOD_S):
-            self._driver.on_command(Twist2D.ZERO, self.now_s)
+            self._driver.accept_velocity_command(Twist2D.ZERO, self.now_s)
         if self._is_due("cycle", 1.0 / self._robot.rates.control_hz):
             self._queue_up(self._driver.tick(self.now_s))
         if self._is_due("watchdog", WATCHDOG_PERIOD_S):

@@ -10,9 +10,9 @@ from canbase_config.profile import Sdo
 from canbase_config.robot import Robot
 from canbase_driver.boot.sequence import BootReport, boot
 from canbase_driver.boot.steps import (
-    NO_PATIENCE,
+    NO_BOOT_TIMES,
     BootError,
-    Patience,
+    BootTimes,
     Pause,
     Quiet,
     SendNmt,
@@ -49,11 +49,11 @@ class NodeBoot:
         node_id: int,
         drives: tuple[Drive, ...],
         robot: Robot,
-        patience: Patience = NO_PATIENCE,
+        learned: BootTimes = NO_BOOT_TIMES,
         *,
         identify: bool = True,
     ) -> None:
-        """`patience`, `identify`: see `boot`."""
+        """`learned`, `identify`: see `boot`."""
         self.node_id = node_id
         self.boot_up_at = -math.inf
         """When the boot-up message came that answered the NMT reset [s]; minus infinity: none did."""
@@ -62,7 +62,7 @@ class NodeBoot:
         self.report: BootReport | None = None
         self.error: BootError | None = None
         self._name = f"node {node_id} ({', '.join(drive.joint for drive in drives)})"
-        self._sequence = boot(node_id, drives, robot, patience, identify=identify)
+        self._sequence = boot(node_id, drives, robot, learned, identify=identify)
         self._client = sdo_client(node_id, drives[0].kind.sdo, robot.timeouts.sdo_s)
         self._gap_s = drives[0].kind.sdo.gap_s
         self._held: Read | Write | None = None
@@ -73,7 +73,7 @@ class NodeBoot:
         self.transfers = 0
         """How many SDO transfers it has begun since it was heard: looking for an absent drive counts for nothing."""
         self._begun_at = 0.0
-        self.heard = False
+        self.is_present = False
         """Whether it has answered any request."""
         self._outbox: list[Frame] = []
 
@@ -85,7 +85,7 @@ class NodeBoot:
     @property
     def configuring(self) -> bool:
         """Whether the drive has answered, and its SDOs fill the bus."""
-        return not self.done and self.heard
+        return not self.done and self.is_present
 
     def is_transferring(self, now_s: float) -> bool:
         """Whether its next step is an SDO transfer, and the drive answers, or the request still waits to be sent."""
@@ -162,7 +162,7 @@ class NodeBoot:
         except SdoError as error:
             self._advance(error, now_s)
         else:
-            self.heard, self.reset_at = True, -math.inf
+            self.is_present, self.reset_at = True, -math.inf
             self._advance(answer, now_s)
 
     def _advance(self, answer: bytes | bool | SdoError | None, now_s: float) -> None:
@@ -179,7 +179,7 @@ class NodeBoot:
     def _begin(self, step: Step, now_s: float) -> None:
         self._step = step
         if isinstance(step, Read | Write):
-            self.transfers += self.heard
+            self.transfers += self.is_present
             self._begun_at = now_s
         if isinstance(step, Read | Write) and self._gap_s > 0.0:
             self._held, self._wake_at = step, now_s + self._gap_s

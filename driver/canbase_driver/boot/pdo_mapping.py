@@ -47,34 +47,34 @@ def configure_pdos(node: NodeAccess, layout: NodeLayout) -> Steps[None]:
         if index not in wanted and index not in spare:
             yield from _switch_off(node, index, cob_id)
     for index, pdo in wanted.items():
-        found = cob_ids[index]
-        yield from _make_right(node, layout, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+        old = cob_ids[index]
+        yield from _make_right(node, layout, pdo, old, old & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
 
     for index, pdo in spare.items():
         yield from _publish_what_it_maps(node, layout, pdo, cob_ids.get(index))
 
 
-def _publish_what_it_maps(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int | None) -> Steps[None]:
-    """A spare TPDO with named values; `found`: its present COB-ID, None: it has none. Nothing that stops the robot
+def _publish_what_it_maps(node: NodeAccess, layout: NodeLayout, pdo: Pdo, old: int | None) -> Steps[None]:
+    """A spare TPDO with named values; `old`: its present COB-ID, None: it has none. Nothing that stops the robot
     depends on it: a refusal is a note, and the PDO is off."""
     why = "the drive has no such PDO"
-    if found is not None:
+    if old is not None:
         try:
-            yield from _make_right(node, layout, pdo, found, found & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
+            yield from _make_right(node, layout, pdo, old, old & layout.profile.pdo.fixed_cob_id_bits | pdo.cob_id)
         except BootError as refused:
             why = refused.problem
         except SdoAborted as refused:
             why = str(refused)
         else:
             return
-        yield from node.set_if_present(Write(pdo.communication, 1, found | PDO_OFF, 4))
+        yield from node.set_if_present(Write(pdo.communication, 1, old | PDO_OFF, 4))
     names = ", ".join(value.name for value in layout.values[pdo.number - FIRST_SPARE_TPDO].values)
     node.notes.append(f"{names}: not published, {pdo.name}: {why}; see `values` of its drive in robot.yaml")
 
 
 def _with_tpdos_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int]) -> Steps[NodeLayout]:
     """One TPDO for each motor, where it has no more, and the velocity has room in it."""
-    missing = [pdo for pdo in layout.pdos() if pdo.is_heard and pdo.communication not in cob_ids]
+    missing = [pdo for pdo in layout.pdos() if pdo.is_received and pdo.communication not in cob_ids]
     if layout.profile.layout.fits_one_tpdo and missing and not layout.joins_velocity:
         for pdo in missing:
             if not (yield from _lacks(pdo)):
@@ -113,7 +113,7 @@ def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int
             continue
         used = [each.communication for each in pdos]
         free = [index for index in cob_ids if index < FIRST_TPDO and index not in used]
-        if pdo.is_heard or pdo.number <= len(layout.axes) or not free:
+        if pdo.is_received or pdo.number <= len(layout.axes) or not free:
             rpdos = sum(index < FIRST_TPDO for index in cob_ids)
             problem = (
                 f"it has no {pdo.name} ({pdo.communication:04X}h), but {rpdos} RPDOs, {len(cob_ids) - rpdos} TPDOs"
@@ -125,12 +125,12 @@ def _in_what_it_has(node: NodeAccess, layout: NodeLayout, cob_ids: dict[int, int
 
 def _about_pdos(node: NodeAccess, layout: NodeLayout, missing: Pdo) -> Steps[str]:
     """What cures it: its velocity may be narrower than its profile says, and have room in its only TPDO."""
-    if missing.is_heard and layout.profile.layout.fits_one_tpdo and not layout.joins_velocity:
+    if missing.is_received and layout.profile.layout.fits_one_tpdo and not layout.joins_velocity:
         return (
             f"It does not say that {missing.communication:04X}h does not exist: reset it. If it has one TPDO for each "
             f"motor by its manual, set `pdo.tpdos: {len(layout.axes)}` in its drive profile"
         )
-    if missing.is_heard and layout.profile.layout.statusword == "own" and not layout.joins_velocity:
+    if missing.is_received and layout.profile.layout.statusword == "own" and not layout.joins_velocity:
         at = place(layout.profile, VELOCITY_ACTUAL, layout.axes[0])
         if (yield from _size(Read(at.index, at.sub))) == NARROW_BYTES:
             return (
@@ -194,12 +194,12 @@ def _times(pdo: Pdo) -> list[Write]:
     return [Write(pdo.communication, sub, value, 2) for sub, value in values if value is not None]
 
 
-def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int, cob_id: int) -> Steps[None]:
-    """`found`: its present COB-ID. The mapping is looked at first: a drive out of its box has another one."""
+def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, old: int, cob_id: int) -> Steps[None]:
+    """`old`: its present COB-ID. The mapping is looked at first: a drive out of its box has another one."""
     mapped = yield from _other_mapping(pdo)
-    if mapped is None and found == cob_id and (yield from _is_timed(node, pdo)):
+    if mapped is None and old == cob_id and (yield from _is_timed(node, pdo)):
         return
-    stays_on = yield from _suspend(node, pdo.communication, found)
+    stays_on = yield from _suspend(node, pdo.communication, old)
     try:
         if mapped is not None:
             yield from _map_what_it_takes(node, pdo, mapped)
@@ -222,7 +222,7 @@ def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, found: int, cob_
             yield from node.set_if_present(time)
     # that a TPDO is on shows by itself: a node without every one of its layout does not become ready
     on = Write(pdo.communication, 1, cob_id, 4)
-    yield from node.overwrite(on, f"{found:08X}h", read_back=not pdo.is_heard)
+    yield from node.overwrite(on, f"{old:08X}h", read_back=not pdo.is_received)
 
 
 def _is_timed(node: NodeAccess, pdo: Pdo) -> Steps[bool]:
@@ -248,9 +248,9 @@ def _set_type(node: NodeAccess, pdo: Pdo, *, unread: bool) -> Steps[None]:
             why = why or other.problem
         else:
             return
-    found = yield from node.read_if_present(pdo.communication, TYPE)
+    type_now = yield from node.read_if_present(pdo.communication, TYPE)
     problem = f"{why}, {pdo.name} does not take type {_types(pdo)[0]}"
-    raise BootError(node.node_id, problem, (yield from _about_type(node, pdo, found)))
+    raise BootError(node.node_id, problem, (yield from _about_type(node, pdo, type_now)))
 
 
 def _set_by_event(node: NodeAccess, layout: NodeLayout, pdo: Pdo, refused: BootError) -> Steps[None]:
@@ -267,14 +267,14 @@ def _set_by_event(node: NodeAccess, layout: NodeLayout, pdo: Pdo, refused: BootE
     except BootError:
         raise refused from None
     for time in _times(own):
-        if not (yield from node.set_if_present(time)) and pdo.is_heard:
+        if not (yield from node.set_if_present(time)) and pdo.is_received:
             raise BootError(
                 node.node_id,
                 f"{refused.problem}, nor {time}",
                 f"Without SYNC it must come every {own.event_timer_ms} ms: set this with the maker's tool; "
                 f"{ELSE_UNUSABLE}",
             )
-    how = f"it is sent every {own.event_timer_ms} ms by its timer" if pdo.is_heard else "it acts when it arrives"
+    how = f"it is sent every {own.event_timer_ms} ms by its timer" if pdo.is_received else "it acts when it arrives"
     node.notes.append(f"{refused.problem}: {how} (type 255 or 254)")
 
 
@@ -282,13 +282,13 @@ def _types(pdo: Pdo) -> tuple[int, ...]:
     return EVENT_TYPES if pdo.transmission_type == AT_ONCE else (pdo.transmission_type,)
 
 
-def _about_type(node: NodeAccess, pdo: Pdo, found: int | None) -> Steps[str]:
+def _about_type(node: NodeAccess, pdo: Pdo, type_now: int | None) -> Steps[str]:
     """What cures it. The key of the profile, only where the drive takes the type that this key leads to."""
     tool = f"Set {pdo.communication:04X}h:{TYPE} to {pdo.transmission_type} with the maker's tool"
     if pdo.transmission_type == AT_ONCE and pdo.event_timer_ms is None:
         return f"{tool}: the watchdog's quick stop cannot wait for a SYNC; {ELSE_UNUSABLE}"
     if pdo.transmission_type == AT_ONCE and (
-        found == EVERY_SYNC or (yield from node.tries(Write(pdo.communication, TYPE, EVERY_SYNC, 1)))
+        type_now == EVERY_SYNC or (yield from node.tries(Write(pdo.communication, TYPE, EVERY_SYNC, 1)))
     ):
         return "The drive takes no event-driven PDO: set `pdo.synchronous: true` in its drive profile"
     return f"It takes no other type either. {tool}; {ELSE_UNUSABLE}"
@@ -328,7 +328,7 @@ def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
             yield from _look_for_width(node, pdo, sub, refused)
             raise _unmapped(node, pdo, sub, _named(entry), refused) from refused
     yield from _write_count(node, pdo, len(pdo.mapping))
-    if not (yield from (_holds(pdo) if pdo.is_heard else _is_mapped(pdo))):
+    if not (yield from (_holds(pdo) if pdo.is_received else _is_mapped(pdo))):
         problem = f"{pdo.name} reads back another mapping than was written to {pdo.mapping_object:04X}h"
         tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool; {ELSE_UNUSABLE}"
         raise BootError(node.node_id, problem, tool)

@@ -43,23 +43,23 @@ def check_expected(node: NodeAccess, drive: Drive) -> Steps[None]:
             data: bytes = yield Read(expected.index, expected.sub)
         except SdoAborted as refused:
             raise BootError(node.node_id, f"{at} cannot be read: {refused.text}", _cure(drive, expected)) from refused
-        found = unsigned(data)
-        if not data or found != expected.value % (1 << 8 * len(data)):
-            problem = f"{at} is {found}, and was {expected.value} when its wheel was measured"
+        value = unsigned(data)
+        if not data or value != expected.value % (1 << 8 * len(data)):
+            problem = f"{at} is {value}, and was {expected.value} when its wheel was measured"
             raise BootError(node.node_id, problem, _cure(drive, expected))
 
 
 def read_scale(drive: Drive, indexes: Iterable[int]) -> Steps[tuple[Expected, ...]]:
     """Those of SCALE_OBJECTS that the drive has, with their values. It is no defect to have none."""
-    offset, found = _offset(drive), []
+    offset, values = _offset(drive), []
     for index in indexes:
         for sub in (1, 2) if index in RATIOS else (0,):
             try:
                 data: bytes = yield Read(index + offset, sub)
             except SdoAborted:
                 break
-            found.append(Expected(index=index + offset, sub=sub, value=unsigned(data[:4])))
-    return tuple(found)
+            values.append(Expected(index=index + offset, sub=sub, value=unsigned(data[:4])))
+    return tuple(values)
 
 
 def _offset(drive: Drive) -> int:

@@ -29,10 +29,10 @@ from canbase_driver.boot.settings import (
     write_at,
 )
 from canbase_driver.boot.steps import (
-    NO_PATIENCE,
+    NO_BOOT_TIMES,
     BootError,
+    BootTimes,
     NodeAccess,
-    Patience,
     Pause,
     Quiet,
     SendNmt,
@@ -82,7 +82,7 @@ class BootReport:
 
 
 def boot(
-    node_id: int, drives: tuple[Drive, ...], robot: Robot, patience: Patience = NO_PATIENCE, *, identify: bool = True
+    node_id: int, drives: tuple[Drive, ...], robot: Robot, learned: BootTimes = NO_BOOT_TIMES, *, identify: bool = True
 ) -> Steps[BootReport]:
     """All steps for one node, its used axes being `drives`. Raises ValueError when they are not one or two axes.
 
@@ -91,7 +91,7 @@ def boot(
     The last steps read the units: an answer to a write that was requested twice comes before theirs. The steps end with
     the report, or raise BootError when the node cannot be made ready.
     """
-    return _explained(_Boot(node_id, drives, robot, patience, identify).run())
+    return _explained(_Boot(node_id, drives, robot, learned, identify).run())
 
 
 def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
@@ -103,9 +103,9 @@ def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
 
 class _Boot:
     def __init__(
-        self, node_id: int, drives: tuple[Drive, ...], robot: Robot, patience: Patience, identify: bool
+        self, node_id: int, drives: tuple[Drive, ...], robot: Robot, learned: BootTimes, identify: bool
     ) -> None:
-        self._patience, self._identify = patience, identify
+        self._learned, self._identify = learned, identify
         self._drives = tuple(sorted(drives, key=lambda drive: drive.axis))
         self._layout = node_layout(node_id, self._drives, robot)
         self._kind = drives[0].kind
@@ -150,16 +150,16 @@ class _Boot:
             self._node.notes.append(f"1000h:0 is {device_type:08X}h, not the profile 402 (0192h) of a motor drive")
 
     def _check_identity(self) -> Steps[Identity]:
-        found: dict[str, int | None] = {}
+        identity: dict[str, int | None] = {}
         for sub, name in enumerate(NUMBERS, start=1):
             if not self._identify and all(getattr(drive.identity, name) is None for drive in self._drives):
                 continue
-            found[name] = yield from self._node.read_if_present(IDENTITY, sub)
+            identity[name] = yield from self._node.read_if_present(IDENTITY, sub)
             for drive in self._drives:
-                shown = "missing" if found[name] is None else f"{found[name]:08X}h"
+                text = "missing" if identity[name] is None else f"{identity[name]:08X}h"
                 expected = getattr(drive.identity, name)
-                self._compare(f"1018h:{sub} ({name})", found[name], shown, expected, f"{expected or 0:08X}h")
-        return Identity(**found, software=(yield from self._check_software()))
+                self._compare(f"1018h:{sub} ({name})", identity[name], text, expected, f"{expected or 0:08X}h")
+        return Identity(**identity, software=(yield from self._check_software()))
 
     def _check_software(self) -> Steps[str | None]:
         """Only where robot.yaml has an expected one: it takes a segmented transfer, and not every drive has it."""
@@ -170,15 +170,15 @@ class _Boot:
             data: bytes = yield Read(SOFTWARE)
         except SdoAborted:
             data = b""
-        found = data.decode("ascii", "replace").strip(" \0")
+        software = data.decode("ascii", "replace").strip(" \0")
         for text in expected:
-            self._compare("100Ah:0 (software)", found, f'"{found}"', text, f'"{text}"')
-        return found or None
+            self._compare("100Ah:0 (software)", software, f'"{software}"', text, f'"{text}"')
+        return software or None
 
-    def _compare(self, what: str, found: object, shown: str, expected: object, wanted: str) -> None:
-        if expected not in (None, found):
+    def _compare(self, what: str, actual: object, text: str, expected: object, wanted: str) -> None:
+        if expected not in (None, actual):
             hint = "Another drive or firmware has this node id, or `identity` in robot.yaml is wrong"
-            raise BootError(self._node.node_id, f"{what} is {shown}, expected {wanted}", hint)
+            raise BootError(self._node.node_id, f"{what} is {text}, expected {wanted}", hint)
 
     # -- nothing may move
 
@@ -230,8 +230,8 @@ class _Boot:
         yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
 
     def _wait_for_boot_up(self, command: NmtCommand) -> Steps[None]:
-        start, patience, notes = self._kind.start, self._patience, self._node.notes
-        boot_up_s, settle_s = max(start.boot_up_s, patience.boot_up_s), max(start.settle_s, patience.settle_s)
+        start, learned, notes = self._kind.start, self._learned, self._node.notes
+        boot_up_s, settle_s = max(start.boot_up_s, learned.boot_up_s), max(start.settle_s, learned.settle_s)
         self._node.was_reset = yield WaitBootUp(boot_up_s)
         if not self._node.was_reset:
             name = command.name.lower().replace("_", " ")
@@ -248,9 +248,9 @@ class _Boot:
             write = harmless_on_loss(drive)
             if self._kind.self_stop.abort_connection == "no":
                 continue
-            found = yield from self._node.read_if_present(write.index, write.sub)
-            if found is not None:
-                yield from self._node.try_to_write(write, known=found)
+            value = yield from self._node.read_if_present(write.index, write.sub)
+            if value is not None:
+                yield from self._node.try_to_write(write, known=value)
 
 
 def _state(drive: Drive) -> Steps[DriveState | None]:

@@ -194,13 +194,13 @@ def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
     at = place(drive.kind, QUICK_STOP_OPTION, drive.axis)
     if drive.kind.options.quick_stop == "no":
         return
-    found = yield from node.read_if_present(at.index, at.sub)
-    if found is None:
+    option = yield from node.read_if_present(at.index, at.sub)
+    if option is None:
         node.notes.append(
             f"how a quick stop ends is unknown: it must brake {drive.joint} and not let it coast; make sure by the "
             "manual, then press the emergency stop once at low speed"
         )
-    if found != COASTS:
+    if option != COASTS:
         return
     problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
     hint = "Set it to 2 with the maker's tool; where rolling out is right, options.quick_stop: no in its drive profile"
@@ -293,12 +293,12 @@ def _watch_heartbeats(node: NodeAccess, kind: Profile, timeout_ms: int) -> Steps
         return True
     left: int | None = None
     for sub in range(2, entries + 1):
-        found = yield from node.read_if_present(HEARTBEAT_CONSUMER, sub)
-        is_ours = sub == 2 and found == driver
-        if found and not is_ours:
-            yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, sub, 0, 4), known=found)
+        entry = yield from node.read_if_present(HEARTBEAT_CONSUMER, sub)
+        is_ours = sub == 2 and entry == driver
+        if entry and not is_ours:
+            yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, sub, 0, 4), known=entry)
         elif sub == 2:
-            left = found
+            left = entry
     is_watched = yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 1, watchdog, 4))
     if entries > 1:
         yield from node.set_if_present(Write(HEARTBEAT_CONSUMER, 2, driver, 4), known=left)

@@ -56,7 +56,7 @@ class Quiet:
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class BootTimes:
     """What earlier boots of a node have shown, where its profile has less."""
 
     settle_s: float = 0.0
@@ -65,7 +65,7 @@ class Patience:
     """From an NMT reset to its boot-up message [s] (start.boot_up_s)."""
 
 
-NO_PATIENCE = Patience()
+NO_BOOT_TIMES = BootTimes()
 
 
 Step = Read | Write | SendNmt | WaitBootUp | Pause | Quiet
@@ -133,7 +133,7 @@ class NodeAccess:
         if unread and self.was_reset:
             yield from self.overwrite(step, "?")
             return
-        before = (yield from self._look(step)) if known is None else _as_bytes(known, step.size)
+        before = (yield from self._compare_present(step)) if known is None else _as_bytes(known, step.size)
         if before is None or not _same(before, step.data):
             yield from self.overwrite(step, _hex(before) if before else "?", shown_at)
         elif shown_at is not None:
@@ -147,19 +147,19 @@ class NodeAccess:
         refusal = yield from self._write(step)
         is_shown = shown_at is not None and (yield from self._shows(shown_at, step))
         needs_no_look = is_shown or not (read_back or refusal)
-        found = None if needs_no_look else (yield from self._read(step))
-        if found is not None and not _same(found, step.data):
-            problem = f"{step} is {_hex(found)}, expected {_hex(step.data)}{refusal}"
+        actual = None if needs_no_look else (yield from self._read(step))
+        if actual is not None and not _same(actual, step.data):
+            problem = f"{step} is {_hex(actual)}, expected {_hex(step.data)}{refusal}"
             other = "find what else sets it: another master, an input, a program in the drive"
             raise BootError(self.node_id, problem, f"Set {in_digits(step)} with the maker's tool, or {other}")
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:
         """Whether another object shows the mode that was written."""
-        shown = yield from self.read_if_present(shown_at.index, shown_at.sub)
-        if shown is None or shown == unsigned(step.data):
-            return shown is not None
-        self.notes.append(f"{shown_at} shows mode {shown}, {step.value!r} was set; it may take power to change")
+        mode = yield from self.read_if_present(shown_at.index, shown_at.sub)
+        if mode is None or mode == unsigned(step.data):
+            return mode is not None
+        self.notes.append(f"{shown_at} shows mode {mode}, {step.value!r} was set; it may take power to change")
         return False
 
     def note_change(self, step: Write, before: str) -> None:
@@ -217,7 +217,7 @@ class NodeAccess:
             return f" ({refused.text})"
         return ""
 
-    def _look(self, step: Write) -> Steps[bytes | None]:
+    def _compare_present(self, step: Write) -> Steps[bytes | None]:
         """As `_read`. What cannot be read for now is written all the same, and the refusal stays one."""
         try:
             return (yield from self._read(step))
@@ -229,19 +229,19 @@ class NodeAccess:
     def _read(self, step: Write) -> Steps[bytes | None]:
         """None: the object can only be written."""
         try:
-            found: bytes = yield Read(step.index, step.sub)
+            data: bytes = yield Read(step.index, step.sub)
         except SdoAborted as refused:
             if refused.code != WRITE_ONLY:
                 raise
             return None
-        return found
+        return data
 
 
-def _same(found: bytes, wanted: bytes) -> bool:
+def _same(actual: bytes, wanted: bytes) -> bool:
     """The same number, of whatever width the drive has it."""
-    width = min(len(found), len(wanted))
-    rest = found[width:] + wanted[width:]
-    return width > 0 and found[:width] == wanted[:width] and rest.strip(b"\0") in (b"", b"\xff" * len(rest))
+    width = min(len(actual), len(wanted))
+    rest = actual[width:] + wanted[width:]
+    return width > 0 and actual[:width] == wanted[:width] and rest.strip(b"\0") in (b"", b"\xff" * len(rest))
 
 
 def unsigned(data: bytes) -> int:

@@ -30,7 +30,7 @@ class GuardAnswers:
         self.alternates = False
         """Two answers in a row had different toggle bits: they are answers, and no heartbeats."""
 
-    def take(self, frame: Frame) -> Frame | None:
+    def take_answer(self, frame: Frame) -> Frame | None:
         """The heartbeat that an answer stands for, or the boot-up message as it is; None: it counts as not received.
 
         An answer with the toggle bit of the one before is none: a CAN controller may answer by itself, with an old

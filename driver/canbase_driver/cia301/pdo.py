@@ -73,7 +73,7 @@ class Pdo:
         return f"{self.kind}{self.number}"
 
     @property
-    def is_heard(self) -> bool:
+    def is_received(self) -> bool:
         """Whether the driver receives it: whether it is on, and how long it is, shows by itself."""
         return self.kind == "TPDO"
 

@@ -86,7 +86,7 @@ class UploadBlocks:
         """The request."""
         return bytes((0xA4,)) + address(self.step) + bytes((BLOCK_SEGMENTS, SWITCH_BYTES))
 
-    def take(self, data: bytes) -> list[bytes]:
+    def take_answer(self, data: bytes) -> list[bytes]:
         """An answer of the drive, eight bytes. Raises BlockError."""
         if not self.begun:
             return self._on_initiated(data)
@@ -132,12 +132,12 @@ class UploadBlocks:
         if data[0] & 0xE3 != 0xC1:
             self.dropped += 1
             return []
-        found = bytes(self._buffer[: len(self._buffer) - (data[0] >> 2 & 0x07)])
-        if self._announced not in (None, len(found)):
+        data_bytes = bytes(self._buffer[: len(self._buffer) - (data[0] >> 2 & 0x07)])
+        if self._announced not in (None, len(data_bytes)):
             raise BlockError(LENGTH_WRONG)
-        if self._has_crc and crc(found) != int.from_bytes(data[1:3], "little"):
+        if self._has_crc and crc(data_bytes) != int.from_bytes(data[1:3], "little"):
             raise BlockError(CRC_ERROR)
-        self.data = found
+        self.data = data_bytes
         return [b"\xa1"]
 
 
@@ -161,7 +161,7 @@ class DownloadBlocks:
         """The request."""
         return bytes((0xC6,)) + address(self.step) + len(self._bytes).to_bytes(4, "little")
 
-    def take(self, data: bytes) -> list[bytes]:
+    def take_answer(self, data: bytes) -> list[bytes]:
         """An answer of the drive, eight bytes. Raises BlockError."""
         if not self.begun:
             return self._on_initiated(data)
@@ -260,7 +260,7 @@ class BlockSdoClient(SdoClient):
     ) -> list[Frame]:
         dropped = blocks.dropped
         try:
-            answers = blocks.take(data)
+            answers = blocks.take_answer(data)
         except BlockError as error:
             return self._fail(transfer, error.code, now_s)
         self.dropped += blocks.dropped - dropped

@@ -17,7 +17,7 @@ from canbase_driver.cia301.pdo import (
 )
 from canbase_driver.cia402 import VL_RAMP, Command, DriveState, PowerGoal, decode_statusword
 from canbase_driver.drive_units import AxisUnits
-from canbase_driver.drives.let_go import Push
+from canbase_driver.drives.release_test import TorqueEvidence
 from canbase_driver.drives.stall import Stall, StallLimits
 from canbase_driver.drives.standstill import Stillness, StillnessLimits
 from canbase_driver.motion.limiter import Limiter
@@ -53,7 +53,7 @@ class Axis:
         step_m = STEP_MARGIN * Limiter(robot.limits, robot.base.track_m).wheel_mps / robot.rates.control_hz
         self.travel = WheelTravel(metres_per_count, max(1.0, step_m / abs(metres_per_count)))
         self.stillness = Stillness(StillnessLimits.of(robot, drive), metres_per_count)
-        self.push = Push(LETS_GO_SHARE * robot.watchdog.stand_impulse_s, metres_per_count)
+        self.torque_evidence = TorqueEvidence(LETS_GO_SHARE * robot.watchdog.stand_impulse_s, metres_per_count)
         self.stall = Stall(StallLimits.of(robot))
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
@@ -132,9 +132,9 @@ class Axis:
         travel_m = self.travel.travel_m
         self.stillness.on_sample(travel_m, self.velocity_mps, ordered_mps, now_s)
         torque = unpack_torque(data, self._layout)
-        push = self.push
-        push.on_sample(travel_m, torque, ordered_mps, self.has_torque, now_s)
-        self.stall.on_sample(self.velocity_mps, push.share, ordered_mps, lives=push.lives, now_s=now_s)
+        evidence = self.torque_evidence
+        evidence.on_sample(travel_m, torque, ordered_mps, self.has_torque, now_s)
+        self.stall.on_sample(self.velocity_mps, evidence.share, ordered_mps, moves=evidence.encoder_moves, now_s=now_s)
         if self.stall.is_over:
             self.stillness.distrust(self.stall.sentence)
         self.has_new_sample = self._status_is_new

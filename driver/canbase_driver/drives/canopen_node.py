@@ -21,7 +21,7 @@ from canbase_config.robot import Robot
 from canbase_driver.boot.advice import GUARDING_ALONE
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.boot.sequence import BootReport
-from canbase_driver.boot.steps import Patience
+from canbase_driver.boot.steps import BootTimes
 from canbase_driver.cia301.emcy import Emcy, parse_emcy
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
@@ -114,7 +114,7 @@ class CanopenNode:
         self._boot_up_at = -math.inf
         self._second_s = math.inf
         """From the boot-up message of the last boot to a second one [s]; infinity: there was none."""
-        self._patience = Patience()
+        self._learned = BootTimes()
         self._reset_at = -math.inf
         """When an NMT reset was sent that nothing has answered yet [s]; minus infinity: there is none."""
         self._since_s = -math.inf
@@ -177,7 +177,7 @@ class CanopenNode:
         if self._is_configured:
             return f"{self.name}: configured, waits for the boots of the others"
         if self.presence is Presence.BOOTING and self._boot is not None:
-            cure = f"; {self._signs.what_to_check(now_s)}" if self._is_unheard(now_s) else ""
+            cure = f"; {self._signs.what_to_check(now_s)}" if self._is_absent(now_s) else ""
             return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
         if self.presence is Presence.STARTING and self.boot_error and self._awaits_guard:
             return f"{self.name}: {self.boot_error}"
@@ -193,7 +193,7 @@ class CanopenNode:
         if self.presence is Presence.READY or in_time or self._is_configured or is_there:
             return ""
         since_s = now_s - self._ready_at
-        if self._boot is not None and self._boot.heard and not self.boot_error:
+        if self._boot is not None and self._boot.is_present and not self.boot_error:
             done = f"its boot has done {self._boot.transfers} SDO transfers in {now_s - self._since_s:.0f} s"
             slow = self._boot.slow_answers
             return (
@@ -203,13 +203,13 @@ class CanopenNode:
         why = self.boot_error or self._why_gone
         if now_s < self._held_until:
             why = HELD
-        elif self._is_unheard(now_s) or not self.boot_error:
+        elif self._is_absent(now_s) or not self.boot_error:
             why = f"{why.removesuffix('.')}; {self._signs.what_to_check(now_s)}"
         return f"{self.name} is missing since {since_s:.0f} s: {why}"
 
-    def _is_unheard(self, now_s: float) -> bool:
+    def _is_absent(self, now_s: float) -> bool:
         """Its boot has waited for a first answer for UNHEARD_S."""
-        return self._boot is not None and not self._boot.heard and now_s - self._since_s > UNHEARD_S
+        return self._boot is not None and not self._boot.is_present and now_s - self._since_s > UNHEARD_S
 
     def without_self_stop(self) -> str:
         """A sentence when its boot could not set what makes it stop by itself."""
@@ -250,7 +250,7 @@ class CanopenNode:
         too_soon = self.boot_error and now_s - self._since_s < RETRY_S
         if self.presence is not Presence.GONE or too_soon or now_s < self._held_until:
             return
-        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._patience, identify=self._identify)
+        self._boot = NodeBoot(self.node_id, self._drives, self._robot, self._learned, identify=self._identify)
         self._boot_up_at = -math.inf
         self._owed_stop = False
         self._written, self._in_boot = "", WritesInBoot(self._foreign)
@@ -263,9 +263,9 @@ class CanopenNode:
         """
         if self.presence is not Presence.READY:
             return
-        heard_at = min(self.heartbeat_at, *(axis.status_at for axis in self.axes))
-        if now_s - max(heard_at, self._since_s, sync_since) > SEEK_S:
-            self.lose(f"gave no sign for {now_s - heard_at:.1f} s and is looked for", now_s)
+        last_sign_at = min(self.heartbeat_at, *(axis.status_at for axis in self.axes))
+        if now_s - max(last_sign_at, self._since_s, sync_since) > SEEK_S:
+            self.lose(f"gave no sign for {now_s - last_sign_at:.1f} s and is looked for", now_s)
 
     def lose(self, why: str, now_s: float) -> None:
         """It must be booted again before it counts: `why` completes the sentence that begins with its name."""
@@ -329,7 +329,7 @@ class CanopenNode:
 
     def on_heartbeat(self, frame: Frame, now_s: float) -> bool:
         """Take a frame 700h + id. False: neither a heartbeat nor an answer to node guarding that counts."""
-        heartbeat = frame if self._guarded is None else self._guarded.take(frame)
+        heartbeat = frame if self._guarded is None else self._guarded.take_answer(frame)
         parsed = None if heartbeat is None else parse_heartbeat(heartbeat)
         if heartbeat is None or parsed is None or parsed[1] is None:
             return False
@@ -360,19 +360,19 @@ class CanopenNode:
         before_s, self._second_s = self._second_s, gap_s if gap_s <= SECOND_BOOT_UP_S else math.inf
         if self._second_s == math.inf:
             return ""
-        told = f", {gap_s:.2f} s after that of its boot"
+        gap = f", {gap_s:.2f} s after that of its boot"
         if abs(gap_s - before_s) > ALIKE * gap_s:
-            return f"{told}; if it does so after each boot, set start.settle_s in its drive profile"
+            return f"{gap}; if it does so after each boot, set start.settle_s in its drive profile"
         settle_s = SETTLE_FACTOR * gap_s + SETTLE_EXTRA_S
-        self._patience = replace(self._patience, settle_s=max(self._patience.settle_s, settle_s))
-        return f"{told}, again; the next boot waits for it (drive profile: start.settle_s)"
+        self._learned = replace(self._learned, settle_s=max(self._learned.settle_s, settle_s))
+        return f"{gap}, again; the next boot waits for it (drive profile: start.settle_s)"
 
     def _learn_to_wait(self, came: str, now_s: float) -> None:
         """Something of a node that a boot has reset in vain: the next boot waits for its reset."""
         took_s, self._reset_at = now_s - self._reset_at, -math.inf
         if took_s <= LONGEST_RESET_S:
-            boot_up_s = max(self._patience.boot_up_s, RESET_FACTOR * took_s + RESET_EXTRA_S)
-            self._patience = replace(self._patience, boot_up_s=boot_up_s)
+            boot_up_s = max(self._learned.boot_up_s, RESET_FACTOR * took_s + RESET_EXTRA_S)
+            self._learned = replace(self._learned, boot_up_s=boot_up_s)
             cure = f"set `start.boot_up_s: {boot_up_s:.1f}` in its drive profile; the next boot waits as long"
             self.boot_error = f"node {self.node_id}: {came} {took_s:.1f} s after an NMT reset: {cure}"
 
@@ -404,10 +404,10 @@ class CanopenNode:
         write, the node is booted anew once it has no power."""
         self._signs.on_sdo(frame, now_s)
         if self._boot is not None:
-            self._in_boot.take(frame, self._boot)
+            self._in_boot.take_sdo_answer(frame, self._boot)
             self._boot.on_frame(frame, now_s)
             return True
-        self._written = self._foreign.take(frame) or self._written
+        self._written = self._foreign.take_sdo_answer(frame) or self._written
         if self.presence is Presence.READY:
             self._measures.on_frame(frame, now_s)
         elif (speed := self._sdo_stop.speed(frame)) is not None:
@@ -425,7 +425,7 @@ class CanopenNode:
         if self._boot is None:
             return self._measures.tick(now_s) if self.presence is Presence.READY else []
         frames = self._boot.tick(now_s)
-        if self._boot.heard and self._reset_at > -math.inf:
+        if self._boot.is_present and self._reset_at > -math.inf:
             self._learn_to_wait("it answered", now_s)
         if self._boot.error is not None:
             self._note_reset(self._boot, now_s)
@@ -471,14 +471,14 @@ class CanopenNode:
         return nmt(NmtCommand.START, self.node_id)
 
     def _check_started(self, now_s: float) -> None:
-        heard = all(axis.age_s(now_s) <= self._robot.timeouts.feedback_s for axis in self.axes)
+        fed = all(axis.age_s(now_s) <= self._robot.timeouts.feedback_s for axis in self.axes)
         guarded = self._guarded is None or self._guarded.alternates
-        if heard and guarded and self.nmt_state is NmtState.OPERATIONAL:
+        if fed and guarded and self.nmt_state is NmtState.OPERATIONAL:
             self.boot_error = ""
             self._go(Presence.READY, now_s)
         elif now_s - self._since_s > START_TIMEOUT_S:
             self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now_s)}"
-            if heard and self._awaits_guard:
+            if fed and self._awaits_guard:
                 return  # it sends feedback: another boot would bring no watchdog that sends requests
             self.lose(f"could not be started: {self.boot_error}", now_s)
 

@@ -109,8 +109,8 @@ class Drives:
     def silent(self, now_s: float, sync_since: float) -> str:
         """Which node gives no fresh status or heartbeat. `sync_since`: start of the present run of SYNCs [s]."""
         for node in self.nodes:
-            if told := node.silent(now_s, sync_since):
-                return told
+            if problem := node.silent(now_s, sync_since):
+                return problem
         return ""
 
     def fault(self) -> str:
@@ -226,7 +226,7 @@ class Drives:
 
     def braking_mps(self, now_s: float) -> float:
         """The greatest speed of a wheel with power that was measured in the last moments; 0: there is none [m/s]."""
-        return max([abs(each.velocity_mps) for each in self.axes if self._is_driven(each, now_s)], default=0.0)
+        return max([abs(axis.velocity_mps) for axis in self.axes if self._is_driven(axis, now_s)], default=0.0)
 
     def _is_driven(self, axis: Axis, now_s: float) -> bool:
         """With power, by fresh values; or its speed alone is known, by SDO, and it may have power."""
@@ -261,7 +261,7 @@ def _snapshot(node: CanopenNode, axis: Axis, now_s: float) -> DriveSnapshot:
     radius_m = axis.units.radius_m
     code = node.emcy.code if node.emcy else 0
     measured = node.measured(axis, now_s)
-    share = math.nan if axis.push.share is None else axis.push.share * axis.drive.direction
+    share = math.nan if axis.torque_evidence.share is None else axis.torque_evidence.share * axis.drive.direction
     return DriveSnapshot(
         joint=axis.drive.joint,
         node_id=node.node_id,

@@ -56,11 +56,11 @@ class DriveValues:
 
     def values(self, now_s: float) -> tuple[NamedValue, ...]:
         """All of them, in the order of their PDOs."""
-        found = []
+        values = []
         for pdo, raw, at, late_s in zip(self._pdos, self._raw, self._at, self._late_s, strict=True):
             known = raw if now_s - at <= late_s else (math.nan,) * len(pdo.values)
-            found += [
+            values += [
                 NamedValue(of.name, of.unit or "", bits * of.scale, at)
                 for of, bits in zip(pdo.values, known, strict=True)
             ]
-        return tuple(found)
+        return tuple(values)

@@ -34,7 +34,7 @@ class ForeignWrites:
         self._segment: int | None = None
         """Number of the last segment of a block that another client reads from the node; None: no block is read."""
 
-    def take(self, frame: Frame) -> str:
+    def take_sdo_answer(self, frame: Frame) -> str:
         """The object that this answer shows as written, like "1016h:1"; empty: none.
 
         The caller knows that it answers no request of ours: outside of a boot the driver writes only `COMMANDED`.
@@ -68,10 +68,10 @@ class WritesInBoot:
         self._early: dict[bytes, str] = {}
         self._written = ""
 
-    def take(self, frame: Frame, boot: NodeBoot) -> None:
+    def take_sdo_answer(self, frame: Frame, boot: NodeBoot) -> None:
         """An SDO answer, before `boot` takes it in."""
         at = frame.data[1:4]
-        name = self._foreign.take(frame)
+        name = self._foreign.take_sdo_answer(frame)
         name = "" if boot.may_confirm(at) else name
         if name and boot.has_requested(at):
             self._written = name

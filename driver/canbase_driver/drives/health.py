@@ -34,12 +34,12 @@ class HealthWatch:
         self._limits = limits
         self._warned: dict[tuple[str, str], tuple[Excess, float]] = {}
 
-    def look(self, drives: Sequence[DriveSnapshot], now_s: float) -> tuple[Excess, ...]:
+    def check_drives(self, drives: Sequence[DriveSnapshot], now_s: float) -> tuple[Excess, ...]:
         """All warnings at `now_s` [s, monotonic], each with its last value beyond the limit."""
         for drive in drives:
             for excess in _beyond(drive, self._limits):
                 self._warned[excess.joint, excess.key] = (excess, now_s)
-        self._warned = {at: (excess, seen) for at, (excess, seen) in self._warned.items() if now_s - seen < CALM_S}
+        self._warned = {key: (excess, at_s) for key, (excess, at_s) in self._warned.items() if now_s - at_s < CALM_S}
         return tuple(excess for excess, _ in self._warned.values())
 
 

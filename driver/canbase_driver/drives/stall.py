@@ -72,15 +72,15 @@ class Stall:
         )
 
     def on_sample(
-        self, velocity_mps: float, share: float | None, ordered_mps: float, *, lives: bool, now_s: float
+        self, velocity_mps: float, share: float | None, ordered_mps: float, *, moves: bool, now_s: float
     ) -> None:
         """One SYNC. `share`: None: unknown. `ordered_mps`: of an enabled drive, else 0.
 
-        `lives`: a sign of life of its encoder, or no torque.
+        `moves`: a sign of life of its encoder, or no torque.
         """
         elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_SAMPLE_GAP_S), now_s
         limits = self._limits
-        if lives or share is None:
+        if moves or share is None:
             self.time_s = 0.0
         elif (
             abs(share) >= limits.torque_share

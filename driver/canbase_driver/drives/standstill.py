@@ -171,8 +171,8 @@ class Stillness:
             return ""
         return f"{self.doubt}; its power has been off for {now_s - self._off_since:.0f} s, so standstill is assumed"
 
-    def _compare(self, shown: bool, ordered_m: float) -> None:
-        if shown:
+    def _compare(self, moved: bool, ordered_m: float) -> None:
+        if moved:
             self._unshown_m, self._lie = 0.0, ""
             return
         self._unshown_m += ordered_m

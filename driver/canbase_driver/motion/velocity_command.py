@@ -26,7 +26,7 @@ class CommandReport:
         return {"commands_refused": self.refused}
 
 
-class Command:
+class VelocityCommand:
     """The last velocity command, with its local receive time [s, monotonic]."""
 
     def __init__(self, timeout_s: float) -> None:
@@ -37,7 +37,7 @@ class Command:
         self.refused = 0
         """Commands that were not finite."""
 
-    def take(self, twist: Twist2D, received_at: float) -> bool:
+    def accept(self, twist: Twist2D, received_at: float) -> bool:
         """Take a command. False, and counted: it was not finite."""
         if not twist.is_finite:
             self.refused += 1

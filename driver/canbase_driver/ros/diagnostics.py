@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from canbase_config.bus_load import BUSY_LOAD
 from canbase_config.diagnostics import BUS, MOTOR_DRIVER, WATCHDOG, drive_name, entry_name
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.drives.drive_snapshot import DriveSnapshot
@@ -97,7 +97,7 @@ def _driver_state(snapshot: DriverSnapshot) -> tuple[bytes, str]:
     if snapshot.state is DriverState.ENABLED:
         return DiagnosticStatus.OK, "All drives are enabled."
     waits = snapshot.state is DriverState.DISARMED  # for a zero command, for example: nothing is defective
-    missing = snapshot.finding.cause is Cause.DRIVE_MISSING
+    missing = snapshot.finding.cause is DriverCause.DRIVE_MISSING
     level = DiagnosticStatus.WARN if (snapshot.state.passes or waits) and not missing else DiagnosticStatus.ERROR
     detail = f": {snapshot.finding.detail.rstrip('.')}" if snapshot.finding.detail else ""
     clears = f" It ends with: {snapshot.finding.clears_on}." if snapshot.finding.clears_on else ""
@@ -130,7 +130,7 @@ def _watchdog_entry(watchdog: WatchdogReport, previous: WatchdogReport, robot: s
         "state": watchdog.view.value,
         "cause": watchdog.cause,
         "rung of its ladder": RUNGS[rung] if rung < len(RUNGS) else rung,
-        "last frame": _heard(watchdog.age_s),
+        "last frame": _last_received(watchdog.age_s),
         "age of the last lease [s]": watchdog.lease_age_s,
         "longest pause of its loop [s]": watchdog.pause_max_s,
         **_named(events),
@@ -142,8 +142,8 @@ def _watchdog_state(watchdog: WatchdogReport) -> tuple[bytes, str]:
     if watchdog.view is WatchdogView.TRIPPED:
         return DiagnosticStatus.ERROR, f"The watchdog has tripped: {watchdog.cause}. Remove the cause, then reset."
     if watchdog.view is not WatchdogView.OK:
-        heard = _heard(watchdog.age_s)
-        sentence = f"The watchdog is missing: its state frame was {heard}. Is its process running, and on this bus?"
+        received = _last_received(watchdog.age_s)
+        sentence = f"The watchdog is missing: its state frame was {received}. Is its process running, and on this bus?"
         return DiagnosticStatus.ERROR, sentence
     if watchdog.pause_max_s > _PAUSE_WARNING_S:
         return DiagnosticStatus.WARN, f"The watchdog watches, but its loop paused {watchdog.pause_max_s:.3f} s."
@@ -184,8 +184,8 @@ def _drive_entry(
         "target [rad/s]": drive.target_radps,
         "velocity [rad/s]": drive.velocity_radps,
         "position [rad]": drive.position_rad,
-        "last status TPDO": _heard(drive.feedback_age_s),
-        "last heartbeat": _heard(drive.heartbeat_age_s),
+        "last status TPDO": _last_received(drive.feedback_age_s),
+        "last heartbeat": _last_received(drive.heartbeat_age_s),
         "stops by itself": drive.self_stop or "no",
         "warning (bit 7)": drive.warning,
         "internal limit (bit 11)": drive.internal_limit,
@@ -206,7 +206,7 @@ def _drive_state(drive: DriveSnapshot, state: DriverState) -> tuple[bytes, str]:
     if drive.boot_problem:
         return DiagnosticStatus.ERROR, f"Its last boot failed: {drive.boot_problem.rstrip('.')}."
     if math.isnan(drive.feedback_age_s):
-        return DiagnosticStatus.ERROR, f"No feedback yet; its heartbeat was {_heard(drive.heartbeat_age_s)}."
+        return DiagnosticStatus.ERROR, f"No feedback yet; its heartbeat was {_last_received(drive.heartbeat_age_s)}."
     if state is DriverState.ENABLED and not drive.stops_by_itself:
         return DiagnosticStatus.WARN, f"{words}, but it would not stop by itself without us (1016h)."
     if drive.warning:
@@ -249,7 +249,7 @@ def values_message(snapshot: DriverSnapshot, stamp: Time, robot: str) -> Diagnos
     return message
 
 
-def _heard(age_s: float) -> str:
+def _last_received(age_s: float) -> str:
     return "never received" if math.isnan(age_s) else f"received {age_s:.3f} s ago"
 
 

@@ -30,15 +30,15 @@ class Asked:
 def answer_later(service: Service, on_request: Callable[[Asked], None]) -> None:
     """From now on `on_request` takes the requests of `service`. It must not wait; the answer may come at any time."""
     send = service.send_response
-    taken: deque[Any] = deque()
+    requests: deque[Any] = deque()
 
     def take(request: Any, response: Any) -> Any:
-        taken.append(request)
+        requests.append(request)
         return response
 
     def hand_over(response: Any, header: Any) -> None:
         sent_s = header.source_timestamp / 1e9
-        on_request(Asked(taken.popleft(), response, sent_s, lambda: send(response, header)))
+        on_request(Asked(requests.popleft(), response, sent_s, lambda: send(response, header)))
 
     service.callback = take
     service.send_response = hand_over  # type: ignore[method-assign]

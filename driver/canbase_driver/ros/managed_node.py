@@ -18,7 +18,7 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from canbase_driver.ros.late_answer import Asked, answer_later
 from canbase_driver.ros.request_age import refusal
 from canbase_driver.runtime.control_thread import ControlLoop
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.sim_time import refuse_sim_time
@@ -75,7 +75,7 @@ class ManagedNode(LifecycleNode):
         machine.trigger_transition_by_id(number, True)
         return aim
 
-    def _end(self, asked: Asked, aim: Aim, outcome: Outcome) -> None:
+    def _end(self, asked: Asked, aim: Aim, outcome: RequestOutcome) -> None:
         taken_back = self._loop.aimed_at is not aim
         end = TransitionCallbackReturn.FAILURE if taken_back else TransitionCallbackReturn.SUCCESS
         self._state_machine.trigger_transition_by_label(end.to_label(), True)

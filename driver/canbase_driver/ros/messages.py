@@ -66,13 +66,13 @@ def joint_state_message(snapshot: DriverSnapshot, stamp: Time) -> JointState:
 
     Effort at the wheel [N·m] where a drive's torque is known; NaN for the others; empty where none is known.
     """
-    heard = heard_drives(snapshot)
+    drives = reporting_drives(snapshot)
     message = JointState()
     message.header.stamp = stamp
-    message.name = [drive.joint for drive in heard]
-    message.position = [drive.position_rad for drive in heard]
-    message.velocity = [drive.velocity_radps for drive in heard]
-    message.effort = efforts_nm(heard)
+    message.name = [drive.joint for drive in drives]
+    message.position = [drive.position_rad for drive in drives]
+    message.velocity = [drive.velocity_radps for drive in drives]
+    message.effort = efforts_nm(drives)
     return message
 
 
@@ -106,7 +106,7 @@ def battery_message(snapshot: DriverSnapshot, stamp: Time, battery: Battery) -> 
     )
 
 
-def heard_drives(snapshot: DriverSnapshot) -> list[DriveSnapshot]:
+def reporting_drives(snapshot: DriverSnapshot) -> list[DriveSnapshot]:
     """The drives that have given feedback."""
     return [drive for drive in snapshot.drives if not math.isnan(drive.feedback_age_s)]
 

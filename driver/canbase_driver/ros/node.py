@@ -36,7 +36,7 @@ from canbase_driver.runtime.bus_traffic import MeasuredLoad
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.stop_history import StopRecord
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import EventLog, Journal
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
 
@@ -51,7 +51,7 @@ class MotorDriverNode(ManagedNode):
         super().__init__("motor_driver", loop)
         self._robot = robot
         self._receive_times = ReceiveTimes()
-        self.voice = Voice(self.get_logger(), Journal("motor_driver"))
+        self.event_log = EventLog(self.get_logger(), Journal("motor_driver"))
         self._odom = self.create_publisher(Odometry, "odom", 10)
         publishes_tf = robot.odometry.publish_tf and messages.TFMessage is not None
         self._tf = self.create_publisher(messages.TFMessage, "tf", 100) if publishes_tf else None
@@ -62,10 +62,10 @@ class MotorDriverNode(ManagedNode):
         self._values = self.create_publisher(DiagnosticArray, "motor_driver/values", 10) if has_values else None
         self._values_at = -math.inf
         self._battery = self.create_publisher(BatteryState, "battery_state", 10) if robot.battery else None
-        self.create_subscription(TwistStamped, "cmd_vel", self._on_command, COMMAND_QOS)
+        self.create_subscription(TwistStamped, "cmd_vel", self._on_velocity_command, COMMAND_QOS)
         self.create_subscription(SafetyState, "safety_filter/state", self._on_safety, COMMAND_QOS)
-        self._stops = StopEvents(self, robot, ring, writer, self.voice)
-        self._records = RecordService(self, self.voice, self._stops.record)
+        self._stops = StopEvents(self, robot, ring, writer, self.event_log)
+        self._records = RecordService(self, self.event_log, self._stops.record)
         self._offers = DriverServices(self, loop, robot.base.odom_frame, self.request_times)
         self._motion = SerializedMotion()
         self._previous: DriverSnapshot | None = None
@@ -86,7 +86,7 @@ class MotorDriverNode(ManagedNode):
     def publish(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
         """Publish a snapshot; called by the publisher's thread alone."""
         stamp = self.get_clock().now().to_msg()
-        self._stops.tell(snapshot, stops)
+        self._stops.publish_stops(snapshot, stops)
         if snapshot.odometry.valid:
             self._odom.publish(self._motion.odometry(snapshot, stamp))
             self._joints.publish(self._motion.joint_state(snapshot, stamp))
@@ -112,14 +112,14 @@ class MotorDriverNode(ManagedNode):
         """The control thread has ended: report the stops that are still open."""
         self._stops.end()
 
-    def _on_command(self, message: TwistStamped) -> None:
+    def _on_velocity_command(self, message: TwistStamped) -> None:
         received_at = self._receive_times.at(time.monotonic())
         twist = Twist2D(message.twist.linear.x, message.twist.angular.z)
         if not twist.is_finite:
             self.get_logger().error(f"cmd_vel refused: {twist} is not finite", throttle_duration_sec=1.0)
-        self._loop.command(twist, received_at)
+        self._loop.queue_velocity_command(twist, received_at)
         stamp = message.header.stamp
-        self._stops.on_command(twist, stamp.sec + stamp.nanosec * 1e-9, received_at)
+        self._stops.queue_velocity_command(twist, stamp.sec + stamp.nanosec * 1e-9, received_at)
 
     def _on_safety(self, message: SafetyState) -> None:
         """For the record of stops alone: how to brake comes with the command's lease, by the watchdog."""
@@ -147,7 +147,7 @@ class MotorDriverNode(ManagedNode):
     def _diagnose(self, snapshot: DriverSnapshot, stamp: object) -> None:
         """Once a second: entries in /diagnostics, the load of the bus since the last time, the battery."""
         before, self._diagnosed = self._diagnosed or snapshot, snapshot
-        load = self._bus_load.look(self._loop.traffic(), snapshot.time_s)
+        load = self._bus_load.measure(self._loop.traffic(), snapshot.time_s)
         message = diagnostics_message(
             snapshot,
             stamp,
@@ -171,7 +171,7 @@ class MotorDriverNode(ManagedNode):
         self._stops.on_state(snapshot)
         priority = Priority.INFO if finding.cause.is_usual else Priority.WARNING
         cause, robot = finding.cause.value, self._robot.name
-        self.voice.tell(text, priority, state=snapshot.state.name, cause=cause, robot=robot)
+        self.event_log.write(text, priority, state=snapshot.state.name, cause=cause, robot=robot)
 
     def _warn_of_boots(self, snapshot: DriverSnapshot) -> None:
         """Once for each reason why a drive cannot be booted, whatever else keeps the robot stopped."""
@@ -179,16 +179,16 @@ class MotorDriverNode(ManagedNode):
             if drive.boot_problem and self._boot_problems.get(drive.joint) != drive.boot_problem:
                 sentence = f"boot of {drive.joint} failed: {drive.boot_problem}"
                 self._stops.note(sentence)
-                self.voice.tell(sentence, Priority.WARNING, robot=self._robot.name)
+                self.event_log.write(sentence, Priority.WARNING, robot=self._robot.name)
             self._boot_problems[drive.joint] = drive.boot_problem
 
     def _warn_of_health(self, snapshot: DriverSnapshot) -> None:
         """Once for each value beyond its limit, until it has been inside for a while."""
         known = {(warning.joint, warning.key) for warning in self._warnings}
-        self._warnings = self._health.look(snapshot.drives, snapshot.time_s)
+        self._warnings = self._health.check_drives(snapshot.drives, snapshot.time_s)
         for warning in self._warnings:
             if (warning.joint, warning.key) not in known:
-                self.voice.tell(warning.text, Priority.WARNING, robot=self._robot.name)
+                self.event_log.write(warning.text, Priority.WARNING, robot=self._robot.name)
 
     def _warn_of_unguarded(self, snapshot: DriverSnapshot) -> None:
         """Once after each boot, loudly."""
@@ -196,7 +196,7 @@ class MotorDriverNode(ManagedNode):
         for sentence in self._unguarded:
             if sentence not in before:
                 self._stops.note(sentence)
-                self.voice.tell(sentence, Priority.ERROR, robot=self._robot.name)
+                self.event_log.write(sentence, Priority.ERROR, robot=self._robot.name)
 
 
 def _essence(snapshot: DriverSnapshot) -> tuple[object, ...]:

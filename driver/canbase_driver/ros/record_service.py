@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 
 from canbase_driver.ros.late_answer import Asked, answer_later
 from canbase_driver.runtime.black_box_writer import Written
-from canbase_runtime.journal import Voice
+from canbase_runtime.journal import EventLog
 from canbase_runtime.log_priority import Priority
 
 NAME = "motor_driver/record"
@@ -22,9 +22,9 @@ NAME = "motor_driver/record"
 class RecordService:
     """`record`: takes who is to be told the path and the problem; returns why not now."""
 
-    def __init__(self, node: Node, voice: Voice, record: Callable[[Written], str]) -> None:
+    def __init__(self, node: Node, event_log: EventLog, record: Callable[[Written], str]) -> None:
         self._record = record
-        self._voice = voice
+        self._event_log = event_log
         self._outcomes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         answer_later(node.create_service(Trigger, NAME, _answered_later), self._on_request)
 
@@ -41,7 +41,7 @@ class RecordService:
             _answer(asked, done=False, sentence=refused)
 
     def _end(self, asked: Asked, path: str, problem: str) -> None:
-        self._voice.tell(f"recording requested: {problem or path}", Priority.NOTICE)
+        self._event_log.write(f"recording requested: {problem or path}", Priority.NOTICE)
         _answer(asked, done=not problem, sentence=problem or path)
 
 

@@ -50,19 +50,19 @@ class SerializedMotion:
         """`messages.odometry_message`."""
         if self._odometry is None:
             self._odometry = SerializedMessage(messages.odometry_message(snapshot, stamp), *_ODOMETRY)
-        seen = snapshot.odometry
-        half_rad = messages.half_turn(seen.pose.yaw_rad)
+        odometry = snapshot.odometry
+        half_rad = messages.half_turn(odometry.pose.yaw_rad)
         return self._odometry.pack(
             stamp.sec,
             stamp.nanosec,
-            seen.pose.x_m,
-            seen.pose.y_m,
+            odometry.pose.x_m,
+            odometry.pose.y_m,
             math.sin(half_rad),
             math.cos(half_rad),
-            *seen.pose_covariance,
-            seen.twist.linear_mps,
-            seen.twist.angular_radps,
-            *seen.twist_covariance,
+            *odometry.pose_covariance,
+            odometry.twist.linear_mps,
+            odometry.twist.angular_radps,
+            *odometry.twist_covariance,
         )
 
     def transform(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
@@ -77,19 +77,19 @@ class SerializedMotion:
 
     def joint_state(self, snapshot: DriverSnapshot, stamp: Time) -> bytes:
         """`messages.joint_state_message`."""
-        heard = messages.heard_drives(snapshot)
-        efforts_nm = messages.efforts_nm(heard)
-        layout = ([drive.joint for drive in heard], bool(efforts_nm))
+        drives = messages.reporting_drives(snapshot)
+        efforts_nm = messages.efforts_nm(drives)
+        layout = ([drive.joint for drive in drives], bool(efforts_nm))
         if self._joints is None or layout != self._layout:
             message = messages.joint_state_message(snapshot, stamp)
-            if not heard:
+            if not drives:
                 return bytes(serialize_message(message))
             fields = (*_JOINTS, "effort") if efforts_nm else _JOINTS
             self._joints, self._layout = SerializedMessage(message, *fields), layout
         return self._joints.pack(
             stamp.sec,
             stamp.nanosec,
-            *[drive.position_rad for drive in heard],
-            *[drive.velocity_radps for drive in heard],
+            *[drive.position_rad for drive in drives],
+            *[drive.velocity_radps for drive in drives],
             *efforts_nm,
         )

@@ -18,9 +18,9 @@ from canbase_driver.ros.late_answer import Asked, answer_later
 from canbase_driver.ros.messages import pose_of
 from canbase_driver.ros.request_age import refusal
 from canbase_driver.runtime.control_thread import ControlLoop
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_runtime.foreign_text import printable
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import EventLog, Journal
 from canbase_runtime.log_budget import LogBudget
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
@@ -40,7 +40,7 @@ class DriverServices:
         self._odom_frame = odom_frame
         self._request_times = request_times
         self._budget = LogBudget()
-        self._voice = Voice(node.get_logger(), Journal("motor_driver"))
+        self._event_log = EventLog(node.get_logger(), Journal("motor_driver"))
         answer_later(node.create_service(Trigger, "motor_driver/stop", _answered_later), self._on_stop)
         self._offer("motor_driver/reset", self._on_reset)
         self._offer("motor_driver/reset_odometry", self._on_reset_odometry)
@@ -50,30 +50,30 @@ class DriverServices:
         def on_request(asked: Asked) -> None:
             old = refusal(self._request_times.waited(time.monotonic()), asked.sent_s, time.time())
             if old:
-                self._answer(asked, Outcome(False, old))
+                self._answer(asked, RequestOutcome(False, old))
             else:
                 carry_out(asked)
 
         answer_later(self._node.create_service(Trigger, name, _answered_later), on_request)
 
-    def _answer(self, asked: Asked, outcome: Outcome) -> None:
+    def _answer(self, asked: Asked, outcome: RequestOutcome) -> None:
         asked.response.success, asked.response.message = outcome.done, outcome.sentence
         asked.answer()
 
     def _on_stop(self, asked: Asked) -> None:
         """However old it is, and whatever else is under way. The answer means that the control thread obeys."""
         self._loop.stop(lambda outcome: self._answer(asked, outcome))
-        self._voice.tell("stop requested", Priority.WARNING)
+        self._event_log.write("stop requested", Priority.WARNING)
 
     def _on_reset(self, asked: Asked) -> None:
-        def end(outcome: Outcome) -> None:
-            self._voice.tell(f"reset: {outcome.sentence}", Priority.NOTICE)
+        def end(outcome: RequestOutcome) -> None:
+            self._event_log.write(f"reset: {outcome.sentence}", Priority.NOTICE)
             self._answer(asked, outcome)
 
         self._loop.reset(end)
 
     def _on_reset_odometry(self, asked: Asked) -> None:
-        def end(outcome: Outcome) -> None:
+        def end(outcome: RequestOutcome) -> None:
             self._tell(outcome)
             self._answer(asked, outcome)
 
@@ -91,11 +91,11 @@ class DriverServices:
         else:
             self._loop.set_pose(pose_of(message.pose.pose), self._tell_pose)
 
-    def _tell_pose(self, outcome: Outcome) -> None:
+    def _tell_pose(self, outcome: RequestOutcome) -> None:
         """A topic, which may be flooded."""
         self._node.get_logger().info(outcome.sentence, throttle_duration_sec=1.0)
 
-    def _tell(self, outcome: Outcome) -> None:
+    def _tell(self, outcome: RequestOutcome) -> None:
         omitted = self._budget.take(time.monotonic())
         if omitted is not None:
             self._node.get_logger().info(outcome.sentence + (f" ({omitted} lines omitted)" if omitted else ""))

@@ -97,8 +97,8 @@ def _order(message: Twist | TwistStamped | JointState, robot: Robot) -> dict[str
     stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
     if isinstance(message, TwistStamped):
         return {"stamp_s": stamp_s, **_order(message.twist, robot)}
-    found = base_velocity(message, robot)
-    order = found if isinstance(found, BaseVelocity) else BaseVelocity(math.nan, math.nan)
+    velocity = base_velocity(message, robot)
+    order = velocity if isinstance(velocity, BaseVelocity) else BaseVelocity(math.nan, math.nan)
     return {"stamp_s": stamp_s, "linear_mps": order.linear_mps, "angular_radps": order.angular_radps}
 
 

@@ -30,7 +30,7 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.state_machine import POWER_OFF_TIMEOUT_S
 from canbase_driver.supervision.stop_history import FILTER, NOBODY, StopHistory, StopRecord, StopReport, standstill_text
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
-from canbase_runtime.journal import Voice
+from canbase_runtime.journal import EventLog
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.stop_cause import stop_cause
 
@@ -41,9 +41,9 @@ STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durabil
 class StopEvents:
     """Publishes one StopEvent for each stop, and has its recording written when it is latched."""
 
-    def __init__(self, node: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, voice: Voice) -> None:
+    def __init__(self, node: Node, robot: Robot, ring: Ring, writer: BlackBoxWriter, event_log: EventLog) -> None:
         self._node = node
-        self._voice = voice
+        self._event_log = event_log
         self._robot_name = robot.name
         self._ring = ring
         self._writer = writer
@@ -55,14 +55,14 @@ class StopEvents:
         self._publisher = node.create_publisher(StopEvent, "stop_events", EVENT_QOS)
         node.create_subscription(MuxState, "velocity_mux/state", self._on_mux, STATE_QOS)
 
-    def on_command(self, twist: Twist2D, stamp_s: float, received_at: float) -> None:
+    def queue_velocity_command(self, twist: Twist2D, stamp_s: float, received_at: float) -> None:
         """A command came, with the stamp of its header [s since 1970]; from the executor's thread."""
         linear_mps, angular_radps = twist.linear_mps, twist.angular_radps
         self._ring.note(received_at, command_note(linear_mps, angular_radps))
         values = {"linear_mps": linear_mps, "angular_radps": angular_radps, "stamp_s": stamp_s}
         self._ring.event(received_at, "cmd_vel", values)
         moves = twist.is_finite and twist != Twist2D.ZERO
-        self._news.put(lambda: self._recorder.on_command(moves, received_at))
+        self._news.put(lambda: self._recorder.note_velocity_command(moves, received_at))
 
     def on_filter(self, message: SafetyState, now_s: float) -> None:
         """The state of the safety filter; from the executor's thread."""
@@ -84,7 +84,7 @@ class StopEvents:
         """The driver's state or its cause is another one."""
         self._ring.event(snapshot.time_s, "motor_driver/state", driver_values(snapshot))
 
-    def tell(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
+    def publish_stops(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> None:
         """Take a snapshot and the stops that the core began; publish what is over. From the publisher's thread."""
         while True:
             try:
@@ -109,7 +109,7 @@ class StopEvents:
         end = standstill_text(report)
         file = f"; black box: {path}" if path else ""
         by = f"{record.stopped_by}: {record.cause} ({record.detail})"
-        self._voice.tell(
+        self._event_log.write(
             f"stop by {by}; standstill {end}{file}",
             Priority.WARNING,
             robot=self._robot_name,

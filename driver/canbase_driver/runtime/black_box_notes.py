@@ -5,10 +5,10 @@ What a part reports is `printable` already: one line, bounded.
 
 from __future__ import annotations
 
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.snapshot import DriverSnapshot
 
-SAID_BY_THE_STATE = (Cause.NONE, Cause.BOOTING, Cause.ENABLING)
+SAID_BY_THE_STATE = (DriverCause.NONE, DriverCause.BOOTING, DriverCause.ENABLING)
 
 
 def title(stopped_by: str, cause: str, detail: str) -> str:

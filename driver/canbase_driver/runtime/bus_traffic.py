@@ -49,7 +49,7 @@ class MeasuredLoad:
         self._at_s = -math.inf
         self.share = math.nan
 
-    def look(self, traffic: Traffic, now_s: float) -> float:
+    def measure(self, traffic: Traffic, now_s: float) -> float:
         """The new share, of the time since the last look [s, monotonic]. A counter that went back begins anew."""
         since_s, before = now_s - self._at_s, self._before
         if since_s < SHORTEST_S:

@@ -43,7 +43,7 @@ class Claim:
             self.bus = BusPort(robot.bus_arguments(), robot.timeouts.drive_heartbeat_s)
             held.callback(self.bus.close)
             self._held = held.pop_all()
-        self._listener = Listener(self.bus, robot.timeouts.drive_heartbeat_s)
+        self._listener = BusListener(self.bus, robot.timeouts.drive_heartbeat_s)
         self._listener.start()
 
     def listen(self) -> None:
@@ -62,14 +62,14 @@ class Claim:
         self._held.close()
 
 
-class Listener(threading.Thread):
+class BusListener(threading.Thread):
     """Reads the bus until it may be sent to; what it reads is for nobody else."""
 
     def __init__(self, bus: BusPort, listen_s: float) -> None:
         super().__init__(name="listener", daemon=True)
         self._bus, self._listen_s = bus, listen_s
         self._ends = threading.Event()
-        self._heard: Frame | None = None
+        self._driver_frame: Frame | None = None
         self._failure: BaseException | None = RuntimeError("nobody has listened to the bus")
 
     def run(self) -> None:
@@ -86,7 +86,7 @@ class Listener(threading.Thread):
             if self._ends.is_set():
                 return BusError("nobody listens to the bus any more")
             if frame is not None and is_of_a_driver(frame):
-                self._heard = frame
+                self._driver_frame = frame
                 return None
             if frame is None and attention.suffices(time.monotonic()):
                 return None
@@ -97,8 +97,8 @@ class Listener(threading.Thread):
         self.join()
         if self._failure is not None:
             raise self._failure
-        if self._heard is not None:
-            raise TakenError(f"{ANOTHER_DRIVER} ({self._heard})")
+        if self._driver_frame is not None:
+            raise TakenError(f"{ANOTHER_DRIVER} ({self._driver_frame})")
 
     def end(self) -> None:
         """It need not listen any more."""

@@ -23,7 +23,7 @@ from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.runtime.bus_traffic import Traffic
 from canbase_driver.snapshot import DriverSnapshot
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.stop_history import StopRecord
 from canbase_runtime.latch_file import LatchKeeper
@@ -37,7 +37,7 @@ SUSPENDED_S = 0.02
 LAST_WORDS = 3
 """How often the quick stop is sent on the way out."""
 
-OnOutcome = Callable[[Outcome], None]
+OnOutcome = Callable[[RequestOutcome], None]
 
 
 class ControlLoop(threading.Thread):
@@ -61,7 +61,7 @@ class ControlLoop(threading.Thread):
         self._period_s = 1.0 / control_hz
         self._samples_per_snapshot = max(1, round(control_hz / odometry_hz))
         self._inbox: queue.SimpleQueue[Callable[[float], object]] = queue.SimpleQueue()
-        self._outcomes: queue.SimpleQueue[tuple[int, Outcome]] = queue.SimpleQueue()
+        self._outcomes: queue.SimpleQueue[tuple[int, RequestOutcome]] = queue.SimpleQueue()
         self._numbers = itertools.count()
         self._asked: dict[int, tuple[str, OnOutcome]] = {}
         """By number: what was requested, and who gets the outcome."""
@@ -75,9 +75,9 @@ class ControlLoop(threading.Thread):
         """When the last cycle began [s, monotonic]: a thread that hangs is seen by it. Infinity before the first."""
         self.failure: BaseException | None = None
 
-    def command(self, twist: Twist2D, received_at: float) -> None:
+    def queue_velocity_command(self, twist: Twist2D, received_at: float) -> None:
         """Hand over a velocity command, from any thread."""
-        self._inbox.put(lambda _now: self._core.on_command(twist, received_at))
+        self._inbox.put(lambda _now: self._core.accept_velocity_command(twist, received_at))
 
     def request_shutdown(self) -> None:
         """Ramp to a stand, disable, end the thread."""
@@ -100,7 +100,7 @@ class ControlLoop(threading.Thread):
 
         def carry_out(_now: float, answer: OnOutcome) -> None:
             self._core.request_stop()
-            answer(Outcome(True, "stopping; nothing moves until motor_driver/reset"))
+            answer(RequestOutcome(True, "stopping; nothing moves until motor_driver/reset"))
 
         self._ask("stop", carry_out, on_outcome, however_late=True)
 
@@ -128,9 +128,9 @@ class ControlLoop(threading.Thread):
                 break
             self._answer(number, outcome)
         for number in tuple(self._asked) if ended else ():
-            self._answer(number, Outcome(False, "not confirmed: motor_driver has ended"))
+            self._answer(number, RequestOutcome(False, "not confirmed: motor_driver has ended"))
 
-    def _answer(self, number: int, outcome: Outcome) -> None:
+    def _answer(self, number: int, outcome: RequestOutcome) -> None:
         name, on_outcome = self._asked.pop(number)
         values = {"request": name, "done": outcome.done, "sentence": outcome.sentence}
         self._ring.event(time.monotonic(), "answer", values)
@@ -147,13 +147,13 @@ class ControlLoop(threading.Thread):
         self._asked[number] = name, on_outcome
         self._ring.event(asked_at, "request", {"request": name})
 
-        def answer(outcome: Outcome) -> None:
+        def answer(outcome: RequestOutcome) -> None:
             self._outcomes.put((number, outcome))
 
         def carry_out(now_s: float) -> None:
             if now_s - asked_at > OLD_S and not however_late:
                 answer(
-                    Outcome(
+                    RequestOutcome(
                         False, f"refused: motor_driver did not run for {now_s - asked_at:.1f} s; send the request again"
                     )
                 )

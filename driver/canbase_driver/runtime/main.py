@@ -105,7 +105,7 @@ def run(
         claim.close()
     failure = failure or loop.failure
     if failure is not None:
-        node.voice.tell(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
+        node.event_log.write(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
         sys.excepthook(type(failure), failure, failure.__traceback__)
     return 0 if failure is None else 1
 
@@ -124,7 +124,7 @@ def _spin(
             node.look_at_the_clock(now_s)
             loop.deliver()
             node.deliver()
-            failure = _failure(threads) or watch.look(loop.cycle_at, now_s)
+            failure = _failure(threads) or watch.check_cycle(loop.cycle_at, now_s)
             if failure is not None:
                 return failure
             if loop.cycle_at < math.inf:
@@ -150,19 +150,19 @@ def _failure(threads: Sequence[Worker]) -> BaseException | None:
 class HangWatch:
     """Distinguishes a thread that hangs from a process that was stopped as a whole, and goes on."""
 
-    def __init__(self, timeout_s: float, look_s: float) -> None:
-        """`look_s`: the longest time between two looks while this thread runs."""
+    def __init__(self, timeout_s: float, check_s: float) -> None:
+        """`check_s`: the longest time between two checks while this thread runs."""
         self._timeout_s = timeout_s
-        self._look_s = look_s
-        self._cycle_at = self._looked_at = math.inf
-        self._seen_s = 0.0
+        self._check_s = check_s
+        self._cycle_at = self._checked_at = math.inf
+        self._without_cycle_s = 0.0
 
-    def look(self, cycle_at: float, now_s: float) -> TimeoutError | None:
+    def check_cycle(self, cycle_at: float, now_s: float) -> TimeoutError | None:
         """Call after each wait with the time of the last cycle. The failure, when there is one."""
-        self._seen_s += max(0.0, min(now_s - self._looked_at, self._look_s))
-        self._looked_at = now_s
+        self._without_cycle_s += max(0.0, min(now_s - self._checked_at, self._check_s))
+        self._checked_at = now_s
         if cycle_at != self._cycle_at:
-            self._cycle_at, self._seen_s = cycle_at, 0.0
-        if self._seen_s <= self._timeout_s:
+            self._cycle_at, self._without_cycle_s = cycle_at, 0.0
+        if self._without_cycle_s <= self._timeout_s:
             return None
         return TimeoutError(f"the control thread has made no cycle for {now_s - cycle_at:.1f} s")

@@ -36,7 +36,7 @@ class ResetPhase(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class RequestOutcome:
     """How it ended."""
 
     done: bool
@@ -107,45 +107,49 @@ class Reset:
         """Bit 7 of the controlword of the drives in fault, in this cycle."""
         return self.phase is ResetPhase.EDGE_HIGH
 
-    def step(self, situation: Situation, answer: int | None, now_s: float) -> Outcome | None:
+    def step(self, situation: Situation, answer: int | None, now_s: float) -> RequestOutcome | None:
         """Judge the situation and move on; the outcome when it has ended.
 
         `answer`: the watchdog's answer to our request, None while there is none.
         """
         problem = _first(BREAKS[self.phase], situation)
         if problem:
-            return Outcome(False, f"broken off: {problem}")
+            return RequestOutcome(False, f"broken off: {problem}")
         return RULES[self.phase](self, situation, answer, now_s)
 
-    def _watchdog(self, situation: Situation, answer: int | None, now_s: float) -> Outcome | None:
+    def _watchdog(self, situation: Situation, answer: int | None, now_s: float) -> RequestOutcome | None:
         if answer is not None and answer not in ACCEPTED:
-            return Outcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
+            return RequestOutcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
         if answer is not None and situation.watchdog is WatchdogView.OK:
             self._go(ResetPhase.DRIVES, now_s)
         elif now_s - self._since_s > WATCHDOG_TIMEOUT_S:
             detail = situation.watchdog_detail or "no answer"
-            return Outcome(False, f"the watchdog is not ready after {WATCHDOG_TIMEOUT_S} s ({detail}); reset again")
+            return RequestOutcome(
+                False, f"the watchdog is not ready after {WATCHDOG_TIMEOUT_S} s ({detail}); reset again"
+            )
         return None
 
-    def _drives(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
+    def _drives(self, situation: Situation, _answer: int | None, now_s: float) -> RequestOutcome | None:
         if not situation.unready:
             self._go(ResetPhase.EDGE_LOW if situation.fault else ResetPhase.FAULTS, now_s)
         elif now_s - self._since_s > self._boot_s:
-            return Outcome(False, f"{situation.unready}; remedy that, then reset again")
+            return RequestOutcome(False, f"{situation.unready}; remedy that, then reset again")
         return None
 
-    def _edge(self, _situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
+    def _edge(self, _situation: Situation, _answer: int | None, now_s: float) -> RequestOutcome | None:
         if now_s - self._since_s >= self._edge_s:
             self._go(ResetPhase.EDGE_HIGH if self.phase is ResetPhase.EDGE_LOW else ResetPhase.FAULTS, now_s)
         return None
 
-    def _faults(self, situation: Situation, _answer: int | None, now_s: float) -> Outcome | None:
+    def _faults(self, situation: Situation, _answer: int | None, now_s: float) -> RequestOutcome | None:
         if not situation.fault:
-            return Outcome(True, "Reset. The drives are enabled once every velocity command is zero")
+            return RequestOutcome(True, "Reset. The drives are enabled once every velocity command is zero")
         if now_s - self._since_s > FAULT_TIMEOUT_S:
             self._tries_left -= 1
             if not self._tries_left:
-                return Outcome(False, f"{situation.fault}: it does not clear; remove its cause, then reset again")
+                return RequestOutcome(
+                    False, f"{situation.fault}: it does not clear; remove its cause, then reset again"
+                )
             self._go(ResetPhase.EDGE_LOW, now_s)
         return None
 
@@ -153,7 +157,7 @@ class Reset:
         self.phase, self._since_s = phase, now_s
 
 
-RULES: dict[ResetPhase, Callable[[Reset, Situation, int | None, float], Outcome | None]] = {
+RULES: dict[ResetPhase, Callable[[Reset, Situation, int | None, float], RequestOutcome | None]] = {
     ResetPhase.WATCHDOG: Reset._watchdog,
     ResetPhase.DRIVES: Reset._drives,
     ResetPhase.EDGE_LOW: Reset._edge,

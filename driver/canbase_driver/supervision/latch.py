@@ -7,7 +7,7 @@ Each record carries how far an operator lets the driver go (`code`): what was sw
 
 from __future__ import annotations
 
-from canbase_driver.causes import Cause, Finding
+from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.phases import Phase
 from canbase_driver.supervision.situation import Situation
@@ -19,35 +19,35 @@ NOT_YET = "the driver's record of stops is not on disk yet"
 _WITH_POWER = (DriverState.ENABLING, DriverState.ENABLED, DriverState.STOPPING)
 
 
-def allowed_before_the_start(found: Found | None) -> Aim:
+def allowed_before_the_start(on_disk: Found | None) -> Aim:
     """How far an operator lets the driver go. A number that this version does not know: no power. A record that cannot
     be used is latched, and its reset is an operator's request for power."""
-    if found is None or found.defect is not Defect.NONE:
+    if on_disk is None or on_disk.defect is not Defect.NONE:
         return Aim.ACTIVE
-    return next((aim for aim in Aim if Aim.ACTIVE - aim == found.record.code), Aim.CONFIGURED)
+    return next((aim for aim in Aim if Aim.ACTIVE - aim == on_disk.record.code), Aim.CONFIGURED)
 
 
-def found_before_the_start(found: Found | None) -> Finding | None:
+def finding_before_the_start(on_disk: Found | None) -> Finding | None:
     """Why the driver is latched from its first moment; None: it is not."""
-    if found is None or not found.latched:
+    if on_disk is None or not on_disk.latched:
         return None
-    if found.defect is not Defect.NONE:
-        return Finding(Cause.RECORD_UNUSABLE, found.sentence, "reset")
-    cause = _recorded(found.record) if found.record.mark is Mark.LATCHED else Cause.ENDED_WITH_POWER
-    return Finding(cause, found.sentence, "reset")
+    if on_disk.defect is not Defect.NONE:
+        return Finding(DriverCause.RECORD_UNUSABLE, on_disk.sentence, "reset")
+    cause = _recorded(on_disk.record) if on_disk.record.mark is Mark.LATCHED else DriverCause.ENDED_WITH_POWER
+    return Finding(cause, on_disk.sentence, "reset")
 
 
-def _recorded(record: Record) -> Cause:
+def _recorded(record: Record) -> DriverCause:
     """What latched then; a word that this version does not know counts as an unusable record."""
-    return next((cause for cause in Cause if cause.value == record.cause), Cause.RECORD_UNUSABLE)
+    return next((cause for cause in DriverCause if cause.value == record.cause), DriverCause.RECORD_UNUSABLE)
 
 
 class PowerRecord:
     """The record that the driver wants on disk, cycle by cycle."""
 
-    def __init__(self, found: Found | None) -> None:
-        """`found`: what was there at the start; None: no record is kept, which is for virtual time alone."""
-        self._ahead = WriteAhead(found)
+    def __init__(self, on_disk: Found | None) -> None:
+        """`on_disk`: what was there at the start; None: no record is kept, which is for virtual time alone."""
+        self._ahead = WriteAhead(on_disk)
 
     @property
     def wanted(self) -> Record:

@@ -19,7 +19,7 @@ from enum import IntEnum
 from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
 from canbase_driver.causes import Finding
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.phases import NO_POWER
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.state_machine import ENABLE_TIMEOUT_S, POWER_OFF_TIMEOUT_S
@@ -45,7 +45,7 @@ class _Change:
     before: Aim
     allowed_before: Aim
     until: float
-    on_outcome: Callable[[Outcome], None]
+    on_outcome: Callable[[RequestOutcome], None]
 
 
 class Lifecycle:
@@ -62,7 +62,7 @@ class Lifecycle:
         """Nothing is sent: never configured, or cleaned up again."""
         self._change: _Change | None = None
         stop_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
-        self._patience_s = {
+        self._timeout_s = {
             Aim.RELEASED: stop_s + MARGIN_S,
             Aim.CONFIGURED: max(timeouts.boot_s, stop_s) + MARGIN_S,
             Aim.ACTIVE: ENABLE_TIMEOUT_S + MARGIN_S,
@@ -82,12 +82,12 @@ class Lifecycle:
     def _since(self) -> str:
         return ", switched off by an operator before this start" if self._kept_off else ""
 
-    def request(self, aim: Aim, now_s: float, on_outcome: Callable[[Outcome], None]) -> None:
+    def request(self, aim: Aim, now_s: float, on_outcome: Callable[[RequestOutcome], None]) -> None:
         """Aim at that; `on_outcome` is called once, when it is there or has failed."""
         if self._change is not None:
-            on_outcome(Outcome(False, f"refused: a change to {self.aim.name} is under way"))
+            on_outcome(RequestOutcome(False, f"refused: a change to {self.aim.name} is under way"))
             return
-        self._change = _Change(self.aim, self.allowed, now_s + self._patience_s[aim], on_outcome)
+        self._change = _Change(self.aim, self.allowed, now_s + self._timeout_s[aim], on_outcome)
         if aim <= self.aim:
             self.allowed = min(self.allowed, aim)
         self.aim, self._kept_off = aim, self._kept_off and aim is not Aim.ACTIVE
@@ -98,14 +98,14 @@ class Lifecycle:
     ) -> bool:
         """Once a cycle, after the state machine. True: the drives are to be released now. `unrecorded`: why `allowed`
         is not on disk; a change is done only when it is."""
-        let_go = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
-        self.released = self.released or let_go
+        releases = self.aim is Aim.RELEASED and not self.released and state in NO_POWER and not situation.powered
+        self.released = self.released or releases
         change = self._change
         if change is not None:
             outcome = self._outcome(change, situation, state, finding, now_s, unrecorded)
             if outcome is not None:
                 self._end(change, outcome)
-        return let_go
+        return releases
 
     def _outcome(
         self,
@@ -115,19 +115,19 @@ class Lifecycle:
         finding: Finding,
         now_s: float,
         unrecorded: str,
-    ) -> Outcome | None:
+    ) -> RequestOutcome | None:
         there = self._there(change, situation, state)
         if there and self.allowed < self.aim:  # an activation that fails leaves the record as it was
             self.allowed = self.aim
             return None
         if there and unrecorded and now_s > change.until:
-            return Outcome(False, f"{self.aim.name.lower()}, and a restart may not keep it: {unrecorded}")
+            return RequestOutcome(False, f"{self.aim.name.lower()}, and a restart may not keep it: {unrecorded}")
         if there and not unrecorded:
-            return Outcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {finding.cause.value})")
+            return RequestOutcome(True, f"{self.aim.name.lower()} ({state.name.lower()}, {finding.cause.value})")
         hopeless = self.aim is Aim.ACTIVE and state is DriverState.LATCHED
         if not there and (hopeless or now_s > change.until):
             ends = f"; ends with: {finding.clears_on}" if finding.clears_on else ""
-            return Outcome(
+            return RequestOutcome(
                 False, f"not {self.aim.name.lower()}: {finding.cause.value} {finding.detail}".rstrip() + ends
             )
         return None
@@ -141,7 +141,7 @@ class Lifecycle:
             return state in NO_POWER and not situation.powered
         return not (situation.unready or situation.missing or situation.bus)
 
-    def _end(self, change: _Change, outcome: Outcome) -> None:
+    def _end(self, change: _Change, outcome: RequestOutcome) -> None:
         self._change = None
         if not outcome.done and self.aim > change.before:
             self.aim, self.allowed = change.before, change.allowed_before

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.supervision.fault_reset import Outcome, Reset, ResetPhase, refusal
+from canbase_driver.supervision.fault_reset import RequestOutcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import WatchdogLink
 
-OnOutcome = Callable[[Outcome], None]
+OnOutcome = Callable[[RequestOutcome], None]
 
 STOOD_STILL_S = 0.5
 """Two steps that are further apart: the process stood still between them, and the caller may be gone."""
@@ -40,24 +40,24 @@ class ResetRun:
         """Whether it begins; `on_outcome` is called at once when it is refused. `stopped`: nothing has power."""
         refused = refusal(situation, stopped)
         if refused is not None:
-            on_outcome(Outcome(False, refused))
+            on_outcome(RequestOutcome(False, refused))
             return False
         self._sequence, self._stepped_at = Reset(now_s, self._cycle_s, self._boot_s), now_s
         self._request, self._on_outcome = self._watchdog.request_reset(), on_outcome
         return True
 
-    def step(self, situation: Situation, now_s: float) -> tuple[list[Frame], Outcome | None]:
+    def step(self, situation: Situation, now_s: float) -> tuple[list[Frame], RequestOutcome | None]:
         """Once a cycle: what to send, and the outcome, which the caller hands to `end`."""
         if self._sequence is None:
             return [], None
         pause_s, self._stepped_at = now_s - self._stepped_at, now_s
         if pause_s > STOOD_STILL_S:
-            return [], Outcome(False, f"broken off: motor_driver did not run for {pause_s:.1f} s; reset again")
+            return [], RequestOutcome(False, f"broken off: motor_driver did not run for {pause_s:.1f} s; reset again")
         outcome = self._sequence.step(situation, self._watchdog.answer(), now_s)
         asks = outcome is None and self._sequence.phase is ResetPhase.WATCHDOG
         return [self._request] if asks else [], outcome
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, outcome: RequestOutcome) -> None:
         """It is over, or broken off; does nothing when none is under way."""
         if self._sequence is not None:
             self._sequence = None

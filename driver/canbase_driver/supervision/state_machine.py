@@ -21,9 +21,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from canbase_driver.causes import Cause, Finding
+from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.motion.braking import Braking
-from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS, Blocker, Hazard, Seen, first
+from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS, Blocker, Detect, Hazard, first
 from canbase_driver.supervision.phases import ORDERS, SHOWN, STOPPING, WAITING, Orders, Phase
 from canbase_driver.supervision.situation import Situation
 from canbase_runtime.driver_state import DriverState
@@ -36,7 +36,7 @@ POWER_OFF_TIMEOUT_S = 0.5
 """Time for the drives to report that power is off; then the stop ends all the same, and the watchdog stays alert."""
 
 
-_HAZARDS_WHILE_ENABLING = tuple(hazard for hazard in HAZARDS if hazard.cause is not Cause.DRIVE_DISABLED)
+_HAZARDS_WHILE_ENABLING = tuple(hazard for hazard in HAZARDS if hazard.cause is not DriverCause.DRIVE_DISABLED)
 _QUICK_HAZARDS = tuple(hazard for hazard in HAZARDS if hazard.quick)
 _LATCHED_HAZARDS = tuple(hazard for hazard in HAZARDS if hazard.latched)
 _LATCHED_HAZARDS_ON_THE_WAY_DOWN = tuple(hazard for hazard in _HAZARDS_WHILE_ENABLING if hazard.latched)
@@ -54,7 +54,7 @@ class Transition:
     label: str
     when: When
     after: Phase
-    cause: Cause | None = None
+    cause: DriverCause | None = None
     """The cause that the driver reports from then on; None: the one before."""
     clears_on: str = ""
     latches: bool | None = None
@@ -72,7 +72,7 @@ class StateMachine:
         `latched`: a stop of before the start, which ends by a reset alone.
         """
         self.phase = Phase.LATCHED if latched else Phase.BOOTING
-        self.finding = latched or Finding(Cause.BOOTING, "", "drives booted")
+        self.finding = latched or Finding(DriverCause.BOOTING, "", "drives booted")
         self.finished = False
         """A shutdown was requested, and the way down is at its end."""
         self.latches = latched is not None
@@ -134,13 +134,13 @@ class StateMachine:
         ramps = self.phase is Phase.RAMP
         worse = first(_LATCHED_HAZARDS if ramps else _LATCHED_HAZARDS_ON_THE_WAY_DOWN, situation)
         if worse is not None:
-            self.finding, self.latches = Finding(worse.cause, worse.seen(situation), worse.clears_on), True
+            self.finding, self.latches = Finding(worse.cause, worse.detect(situation), worse.clears_on), True
 
     def _finish(self) -> None:
         self.finished = True
         if self.phase in (Phase.PREPARING, Phase.ARMING):
             self.phase = Phase.DISARMED
-        self.finding = Finding(Cause.SHUTDOWN, "motor_driver is shutting down", "a new start")
+        self.finding = Finding(DriverCause.SHUTDOWN, "motor_driver is shutting down", "a new start")
 
 
 def _is_down(phase: Phase, situation: Situation) -> bool:
@@ -149,24 +149,24 @@ def _is_down(phase: Phase, situation: Situation) -> bool:
     return phase is Phase.LATCHED or (phase in WAITING and (blocker is None or blocker.phase is not Phase.LATCHED))
 
 
-def _when(seen: Seen) -> When:
-    return lambda machine, s: seen(s) or None
+def _when(detect: Detect) -> When:
+    return lambda machine, s: detect(s) or None
 
 
 def _blocked() -> Iterator[Transition]:
     for row in BLOCKERS:
         latches = row.phase is Phase.LATCHED
-        yield Transition(WAITING, row.cause.value, _when(row.seen), row.phase, row.cause, row.clears_on, latches, row)
+        yield Transition(WAITING, row.cause.value, _when(row.detect), row.phase, row.cause, row.clears_on, latches, row)
 
 
 def _stopped(before: Phase, hazards: tuple[Hazard, ...]) -> Iterator[Transition]:
     for row in hazards:
         after = Phase.QUICK_STOP if row.quick or before is Phase.ENABLING else Phase.RAMP
-        label, when = row.cause.value, _when(row.seen)
+        label, when = row.cause.value, _when(row.detect)
         yield Transition((before,), label, when, after, row.cause, row.clears_on, row.latched, row)
 
 
-def _unprepared_for_long(machine: StateMachine, s: Situation) -> str | None:
+def _long_unprepared(machine: StateMachine, s: Situation) -> str | None:
     return s.unprepared if s.unprepared and machine.elapsed_s > PREPARE_TIMEOUT_S else None
 
 
@@ -212,18 +212,27 @@ _QUICK, _OFF = (Phase.QUICK_STOP,), (Phase.POWER_OFF,)
 TRANSITIONS: tuple[Transition, ...] = (
     *_blocked(),
     Transition(
-        _PREPARING, "not ready for long", _unprepared_for_long, Phase.PREPARING, Cause.DRIVE_NOT_READY, _SWITCHED_ON
+        _PREPARING, "not ready for long", _long_unprepared, Phase.PREPARING, DriverCause.DRIVE_NOT_READY, _SWITCHED_ON
     ),
     Transition(
-        WAITING, "not switched on", _when(lambda s: s.unprepared), Phase.PREPARING, Cause.PREPARING, _SWITCHED_ON
+        WAITING, "not switched on", _when(lambda s: s.unprepared), Phase.PREPARING, DriverCause.PREPARING, _SWITCHED_ON
     ),
     Transition(
-        WAITING, "no record of power", _when(lambda s: s.unarmed), Phase.ARMING, Cause.NO_RECORD, "the record on disk"
+        WAITING,
+        "no record of power",
+        _when(lambda s: s.unarmed),
+        Phase.ARMING,
+        DriverCause.NO_RECORD,
+        "the record on disk",
     ),
-    Transition(WAITING, "nothing blocks", _always, Phase.ENABLING, Cause.ENABLING, "operation enabled on all drives"),
+    Transition(
+        WAITING, "nothing blocks", _always, Phase.ENABLING, DriverCause.ENABLING, "operation enabled on all drives"
+    ),
     *_stopped(Phase.ENABLING, _HAZARDS_WHILE_ENABLING),
-    Transition(_ENABLING, "operation enabled", lambda m, s: None if s.disabled else "", Phase.ENABLED, Cause.NONE),
-    Transition(_ENABLING, "takes too long", _too_late, Phase.QUICK_STOP, Cause.ENABLE_TIMEOUT, "reset", True),
+    Transition(
+        _ENABLING, "operation enabled", lambda m, s: None if s.disabled else "", Phase.ENABLED, DriverCause.NONE
+    ),
+    Transition(_ENABLING, "takes too long", _too_late, Phase.QUICK_STOP, DriverCause.ENABLE_TIMEOUT, "reset", True),
     *_stopped(Phase.ENABLED, HAZARDS),
     Transition(_RAMP, "needs a quick stop", _asks_for_quick_stop, Phase.QUICK_STOP),
     Transition(_RAMP, "at standstill", _stands, Phase.POWER_OFF),
@@ -232,11 +241,11 @@ TRANSITIONS: tuple[Transition, ...] = (
         "feedback implausible",
         _when(lambda s: s.doubted),
         Phase.POWER_OFF,
-        Cause.FEEDBACK_IMPLAUSIBLE,
+        DriverCause.FEEDBACK_IMPLAUSIBLE,
         "reset",
         True,
     ),
-    Transition(_RAMP, "does not stop in time", _keeps_on, Phase.QUICK_STOP, Cause.DID_NOT_STOP, "reset", True),
+    Transition(_RAMP, "does not stop in time", _keeps_on, Phase.QUICK_STOP, DriverCause.DID_NOT_STOP, "reset", True),
     Transition(_QUICK, "at standstill", _stands, Phase.POWER_OFF),
     Transition(_QUICK, "feedback implausible", _when(lambda s: s.doubted), Phase.POWER_OFF),
     Transition(_QUICK, "does not slow down", _keeps_its_speed, Phase.POWER_OFF),

@@ -2,7 +2,7 @@
 
 A stop is opened by the driver's core (`StopRecord`), by the safety filter or the velocity mux when they begin to hold a
 base that moves, or by a command that ends while it moves. It is reported once the base stands, when it was released
-before, or after `patience_s`. Pure: fed with snapshots and with the states of the other nodes; times are local
+before, or after `report_after_s`. Pure: fed with snapshots and with the states of the other nodes; times are local
 monotonic seconds.
 """
 
@@ -72,7 +72,7 @@ def standstill_text(report: StopReport) -> str:
 
 @dataclass(slots=True)
 class _OpenStop:
-    """A stop on its way. `let_go`: what held the base holds it no longer."""
+    """A stop on its way. `released`: what held the base holds it no longer."""
 
     record: StopRecord
     held_by: HeldBy
@@ -80,7 +80,7 @@ class _OpenStop:
     measured: bool = True
     distance_m: float = 0.0
     turned_rad: float = 0.0
-    let_go: bool = field(default=False)
+    released: bool = field(default=False)
 
     def add(self, before: DriverSnapshot, now: DriverSnapshot) -> None:
         """The way between two snapshots."""
@@ -100,15 +100,15 @@ class _OpenStop:
 class StopHistory:
     """All stops that are not reported yet."""
 
-    def __init__(self, patience_s: float) -> None:
-        """`patience_s`: after this long without a standstill the stop is reported all the same [s]."""
-        self._patience_s = patience_s
+    def __init__(self, report_after_s: float) -> None:
+        """`report_after_s`: after this long without a standstill the stop is reported all the same [s]."""
+        self._report_after_s = report_after_s
         self._previous: DriverSnapshot | None = None
         self._open: list[_OpenStop] = []
         self._moved_at = -math.inf
         self._filter_stops = self._mux_idle = False
 
-    def on_command(self, moves: bool, now_s: float) -> None:
+    def note_velocity_command(self, moves: bool, now_s: float) -> None:
         """A velocity command came; `moves`: it is not zero."""
         if moves:
             self._moved_at = now_s
@@ -116,7 +116,7 @@ class StopHistory:
     def on_filter(self, stop: StopRecord | None, now_s: float) -> None:
         """From the safety filter: whether it holds the base, and why; None: it does not."""
         if stop is None:
-            self._let_go(HeldBy.FILTER)
+            self._note_release(HeldBy.FILTER)
         elif not self._filter_stops and (self._is_moving or self._ordered_motion(now_s)):
             self._begin(stop, HeldBy.FILTER)
         self._filter_stops = stop is not None
@@ -127,7 +127,7 @@ class StopHistory:
         if idle and not self._mux_idle and self._is_moving and self._ordered_motion(now_s):
             self._begin(StopRecord(MUX, NO_SOURCE, detail, False, "a source that sends", now_s), HeldBy.MUX)
         if not idle:
-            self._let_go(HeldBy.MUX)
+            self._note_release(HeldBy.MUX)
         self._mux_idle = idle
 
     def on_snapshot(self, snapshot: DriverSnapshot, stops: list[StopRecord]) -> list[StopReport]:
@@ -158,7 +158,7 @@ class StopHistory:
                 StopRecord(DRIVER, STALE, detail, False, "a fresh command", snapshot.time_s), HeldBy.STALE_COMMAND
             )
         if snapshot.command.fresh:
-            self._let_go(HeldBy.STALE_COMMAND)
+            self._note_release(HeldBy.STALE_COMMAND)
 
     @property
     def _is_moving(self) -> bool:
@@ -170,10 +170,10 @@ class StopHistory:
     def _begin(self, record: StopRecord, held_by: HeldBy) -> None:
         self._open.append(_OpenStop(record, held_by, stood=not self._is_moving))
 
-    def _let_go(self, holder: HeldBy) -> None:
+    def _note_release(self, holder: HeldBy) -> None:
         for stop in self._open:
-            stop.let_go = stop.let_go or (stop.held_by is holder and not stop.record.latched)
+            stop.released = stop.released or (stop.held_by is holder and not stop.record.latched)
 
     def _is_over(self, stop: _OpenStop, snapshot: DriverSnapshot) -> bool:
-        late = snapshot.time_s - stop.record.at_s > self._patience_s
-        return snapshot.standstill or stop.let_go or late
+        late = snapshot.time_s - stop.record.at_s > self._report_after_s
+        return snapshot.standstill or stop.released or late

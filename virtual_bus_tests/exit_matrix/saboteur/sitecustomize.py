@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from canbase_driver.cia301.frame import Frame
     from canbase_driver.core import DriverCore
     from canbase_driver.motion.kinematics import Twist2D
-    from canbase_driver.motion.velocity_command import Command
+    from canbase_driver.motion.velocity_command import VelocityCommand
     from canbase_driver.ros.node import MotorDriverNode
     from canbase_driver.snapshot import DriverSnapshot
     from canbase_driver.supervision.stop_history import StopRecord
@@ -85,18 +85,18 @@ def repeat_setpoints() -> None:
 def ignore_zero() -> None:
     """The driver follows each command but zero."""
     from canbase_driver.motion.kinematics import Twist2D
-    from canbase_driver.motion.velocity_command import Command
+    from canbase_driver.motion.velocity_command import VelocityCommand
 
-    usual = Command.target
+    usual = VelocityCommand.target
     last = [Twist2D.ZERO]
 
-    def target(self: Command, now_s: float) -> Twist2D:
+    def target(self: VelocityCommand, now_s: float) -> Twist2D:
         wanted = usual(self, now_s)
         if wanted != Twist2D.ZERO:
             last[0] = wanted
         return last[0]
 
-    Command.target = target  # type: ignore[method-assign]
+    VelocityCommand.target = target  # type: ignore[method-assign]
 
 
 def withhold_odometry() -> None:

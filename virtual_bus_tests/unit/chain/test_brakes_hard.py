@@ -13,7 +13,7 @@ import pytest
 
 from canbase_config.robot import Robot
 from canbase_config.stopping import emergency_wait_s
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.limiter import MotionState
@@ -228,5 +228,5 @@ def test_a_driver_that_receives_no_frame_with_the_bit_brakes_hard_before_it_has_
     time_s, way_m = stop(world)
     assert time_s < 0.65
     assert way_m < 0.28
-    assert world.core.finding.cause is Cause.WATCHDOG_MISSING
+    assert world.core.finding.cause is DriverCause.WATCHDOG_MISSING
     assert watchdog(world).verdict is FINE

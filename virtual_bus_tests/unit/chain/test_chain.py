@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from canbase_driver.causes import Cause
-from canbase_driver.drives.let_go import RETURN_S
+from canbase_driver.causes import DriverCause
+from canbase_driver.drives.release_test import RETURN_S
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
@@ -281,7 +281,7 @@ def test_a_drive_that_fails_after_an_end_and_a_new_start_has_no_excuse_from_befo
     world.run(1.0)
 
     assert world.core.state is DriverState.LATCHED
-    assert world.core.finding.cause is Cause.DRIVE_DISABLED
+    assert world.core.finding.cause is DriverCause.DRIVE_DISABLED
     assert world.core.stops[-1].at_s - began_s < RETURN_S
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from canbase_config.robot import Robot
 from canbase_driver.cia402 import PowerGoal
-from canbase_driver.drives.let_go import LetGo
+from canbase_driver.drives.release_test import ReleaseTest
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
@@ -206,7 +206,7 @@ def test_an_encoder_that_shows_itself_for_moments_is_found_between_taps(kind: st
 
 def never_lets_go(monkeypatch: pytest.MonkeyPatch) -> None:
     """A driver with a defect."""
-    monkeypatch.setattr(LetGo, "step", lambda self, wheels, rests, now_s: None)
+    monkeypatch.setattr(ReleaseTest, "step", lambda self, wheels, rests, now_s: None)
 
 
 @pytest.mark.parametrize(("kind", "cause"), [("generic", MISSING), ("kinco", AT_STAND)])
@@ -240,9 +240,11 @@ def test_a_drive_that_does_not_obey_disable_operation_loses_its_power_by_disable
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Before the watchdog has to."""
-    goal = LetGo.goal
+    goal = ReleaseTest.goal
     monkeypatch.setattr(
-        LetGo, "goal", lambda self, now_s: PowerGoal.ON if goal(self, now_s) is PowerGoal.LET_GO else goal(self, now_s)
+        ReleaseTest,
+        "goal",
+        lambda self, now_s: PowerGoal.ON if goal(self, now_s) is PowerGoal.RELEASE else goal(self, now_s),
     )
     seen = tap(World(), 0.06, 0.1)
     assert seen.cause is TripCause.NONE

@@ -167,7 +167,9 @@ def test_a_profile_can_say_it_before_the_boot(tmp_path: Path) -> None:
     drives = [drive.model_dump(exclude_unset=True) for drive in robot.drives]
     said = Robot.model_validate({**robot.model_dump(), "drives": [{**each, "profile": narrow} for each in drives]})
     layout = node_layout(1, (said.drives[0],), said)
-    assert [(pdo.name, pdo.cob_id, len(pdo.mapping)) for pdo in layout.pdos() if pdo.is_heard] == [("TPDO1", 0x181, 3)]
+    assert [(pdo.name, pdo.cob_id, len(pdo.mapping)) for pdo in layout.pdos() if pdo.is_received] == [
+        ("TPDO1", 0x181, 3)
+    ]
     with pytest.raises(ValidationError, match=r"1 motor\(s\) need 2 RPDOs and 2 TPDOs; .* has fewer"):
         Robot.model_validate({**bench_robot().model_dump(), "drives": [{**each, "profile": wide} for each in drives]})
 

@@ -9,7 +9,7 @@ import pytest
 
 from canbase_config.profile_file import load_profile
 from canbase_config.robot import Robot
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
 from canbase_sim import faults
@@ -64,10 +64,10 @@ def test_a_blocked_wheel_loses_its_power_within_150_ms_of_the_limit(kind: str) -
     off_s = until_off_s(world)
     world.run(0.05)
     if load_profile(kind).options.torque == "none":
-        assert world.core.finding.cause is Cause.WATCHDOG_TRIPPED
+        assert world.core.finding.cause is DriverCause.WATCHDOG_TRIPPED
         return
     assert LIMIT_S <= off_s <= LIMIT_S + ANSWER_S
-    assert world.core.finding.cause is Cause.STALLED
+    assert world.core.finding.cause is DriverCause.STALLED
     assert world.core.finding.detail.startswith(f"{world.robot.drives[0].joint} stalls: 100% of the rated torque")
 
 
@@ -79,7 +79,7 @@ def test_one_wheel_or_both_at_any_speed_and_in_reverse(sides: tuple[str, ...], s
     block(world, *sides)
     world.command = Twist2D(speed, 0.0)
     assert LIMIT_S <= until_off_s(world) <= LIMIT_S + ANSWER_S
-    assert world.core.finding.cause is Cause.STALLED
+    assert world.core.finding.cause is DriverCause.STALLED
 
 
 @pytest.mark.parametrize(("time_s", "share"), [(0.05, 0.8), (0.3, 0.8), (0.3, 0.3)])
@@ -89,7 +89,7 @@ def test_its_limits_are_those_of_robot_yaml_and_the_driver_acts_alone(time_s: fl
     block(world, "left")
     world.command = FORWARD
     assert time_s <= until_off_s(world, share) <= time_s + AT_ONCE_S, "the other wheel is not braked first"
-    assert world.core.finding.cause is Cause.STALLED
+    assert world.core.finding.cause is DriverCause.STALLED
     assert world.watchdog is not None
     assert world.watchdog.status.verdict.cause is TripCause.NONE
 
@@ -115,7 +115,7 @@ def test_the_torque_of_a_wheel_that_the_watchdog_misses_is_named_with_its_trip()
     world.drive(FORWARD, 1.0)
     block(world, "left")
     world.run_until(DriverState.STOPPING, 0.2)
-    assert world.core.finding.cause is Cause.WATCHDOG_TRIPPED
+    assert world.core.finding.cause is DriverCause.WATCHDOG_TRIPPED
     assert "feedback implausible, node 1; left_wheel stalls: 100% of the rated torque" in world.core.finding.detail
 
 
@@ -125,7 +125,7 @@ def test_a_wheel_that_is_blocked_on_the_ramp_of_a_stop_is_no_longer_pushed() -> 
     world.core.request_stop()
     block(world, "left")
     assert world.run(1.0, lambda: not any(world.powered))
-    assert world.core.finding.cause is Cause.STOP_REQUESTED
+    assert world.core.finding.cause is DriverCause.STOP_REQUESTED
 
 
 def loaded(push_share: float) -> World:

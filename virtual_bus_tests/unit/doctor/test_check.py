@@ -16,12 +16,12 @@ from canbase_config.load import load_robot, sample
 from canbase_doctor.check import Verdict, exit_code, first_failure, table
 from canbase_doctor.default_checks import default_checks
 from canbase_doctor.evidence import Evidence, Heard
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_driver.supervision.hazards import HAZARDS
 
 Change = Callable[[Any], None]
 
-STALL = next(hazard for hazard in HAZARDS if hazard.cause is Cause.STALLED)
+STALL = next(hazard for hazard in HAZARDS if hazard.cause is DriverCause.STALLED)
 
 
 def healthy() -> dict[str, Any]:

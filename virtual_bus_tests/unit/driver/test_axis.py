@@ -269,7 +269,7 @@ def test_a_wheel_must_be_released_after_three_quarters_of_what_the_watchdog_wait
     for n in range(1 + round(share * impulse_s / 0.001)):
         left.on_status(status(ENABLED, 0), n * 0.001)
         left.on_velocity(velocity(0), n * 0.001)
-    assert left.push.must_let_go is due
+    assert left.torque_evidence.must_release is due
 
 
 def test_a_wheel_that_nothing_was_ordered_of_owes_no_release() -> None:
@@ -282,7 +282,7 @@ def test_a_wheel_that_nothing_was_ordered_of_owes_no_release() -> None:
         left.target_mps = 0.0
         left.on_status(status(ENABLED, 0), n * 0.01)
         left.on_velocity(velocity(0), n * 0.01)
-    assert not left.push.must_let_go
+    assert not left.torque_evidence.must_release
     assert left.stillness.doubt == ""
 
 

@@ -28,23 +28,23 @@ def test_bits_of_counters_are_those_of_the_frames_one_by_one() -> None:
 def test_the_load_is_that_of_the_time_between_two_looks() -> None:
     """1,000 frames of 8 bytes in 1 s on 500 kbit/s: 135 bits each, 27 %; then half a second without any."""
     load = MeasuredLoad(500_000)
-    assert math.isnan(load.look(Traffic(50, 400), 10.0))
-    assert load.look(Traffic(1050, 8400), 11.0) == pytest.approx(0.27)
-    assert load.look(Traffic(1050, 8400), 11.5) == 0.0
+    assert math.isnan(load.measure(Traffic(50, 400), 10.0))
+    assert load.measure(Traffic(1050, 8400), 11.0) == pytest.approx(0.27)
+    assert load.measure(Traffic(1050, 8400), 11.5) == 0.0
 
 
 def test_a_look_too_soon_keeps_what_is_known() -> None:
     load = MeasuredLoad(500_000)
-    load.look(Traffic(0, 0), 10.0)
-    known = load.look(Traffic(1000, 8000), 11.0)
-    assert load.look(Traffic(1009, 8072), 11.01) == known == load.share
+    load.measure(Traffic(0, 0), 10.0)
+    known = load.measure(Traffic(1000, 8000), 11.0)
+    assert load.measure(Traffic(1009, 8072), 11.01) == known == load.share
 
 
 def test_after_an_interface_was_made_anew_the_load_is_unknown_once() -> None:
     load = MeasuredLoad(500_000)
-    load.look(Traffic(5000, 40_000), 10.0)
-    assert math.isnan(load.look(Traffic(3, 24), 11.0))
-    assert load.look(Traffic(3, 24), 12.0) == 0.0
+    load.measure(Traffic(5000, 40_000), 10.0)
+    assert math.isnan(load.measure(Traffic(3, 24), 11.0))
+    assert load.measure(Traffic(3, 24), 12.0) == 0.0
 
 
 def test_the_kernel_counts_both_ways(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ WORDS = {
     PowerGoal.OFF: OFF_WORDS,
     PowerGoal.QUICK_STOP: dict.fromkeys(ALL, 0x02),
     PowerGoal.READY: OFF_WORDS | {DISABLED: 0x06, READY: 0x07, SWITCHED_ON: 0x07},
-    PowerGoal.LET_GO: OFF_WORDS | {DISABLED: 0x06, READY: 0x07, SWITCHED_ON: 0x07, ENABLED: 0x07},
+    PowerGoal.RELEASE: OFF_WORDS | {DISABLED: 0x06, READY: 0x07, SWITCHED_ON: 0x07, ENABLED: 0x07},
     PowerGoal.RESET: OFF_WORDS | {FAULT: 0x80},
     PowerGoal.ON: {
         None: 0x02,

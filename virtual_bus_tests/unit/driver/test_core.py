@@ -10,7 +10,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.bus_health import BusReport
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 from support.chain_world import World, bench_robot
@@ -58,8 +58,8 @@ def test_counters_of_the_bus_are_passed_on(core: DriverCore) -> None:
 
 
 def test_the_command_is_taken_with_its_receive_time(core: DriverCore) -> None:
-    assert core.on_command(Twist2D(0.1, 0.0), 9.9)
-    assert not core.on_command(Twist2D(math.nan, 0.0), 10.0)
+    assert core.accept_velocity_command(Twist2D(0.1, 0.0), 9.9)
+    assert not core.accept_velocity_command(Twist2D(math.nan, 0.0), 10.0)
     snapshot = core.snapshot(10.0)
     assert snapshot.command.age_s == pytest.approx(0.1)
     assert (snapshot.command.fresh, snapshot.command.refused) == (True, 1)
@@ -67,14 +67,16 @@ def test_the_command_is_taken_with_its_receive_time(core: DriverCore) -> None:
 
 
 def test_without_a_watchdog_a_reset_is_refused_at_once(core: DriverCore) -> None:
-    outcomes: list[Outcome] = []
+    outcomes: list[RequestOutcome] = []
     core.request_reset(10.0, outcomes.append)
-    assert outcomes == [Outcome(False, "refused: watchdog: no frame of it yet; start it with `canbase serve watchdog`")]
+    assert outcomes == [
+        RequestOutcome(False, "refused: watchdog: no frame of it yet; start it with `canbase serve watchdog`")
+    ]
 
 
 def test_a_reset_asks_the_watchdog_in_every_cycle_until_it_answers(core: DriverCore) -> None:
     core.on_frame(WATCHING, 10.0)
-    outcomes: list[Outcome] = []
+    outcomes: list[RequestOutcome] = []
     core.request_reset(10.0, outcomes.append)
     for cycle in range(1, 4):
         core.on_frame(WATCHING, 10.0 + 0.01 * cycle)
@@ -88,23 +90,23 @@ def test_a_reset_asks_the_watchdog_in_every_cycle_until_it_answers(core: DriverC
 def test_a_suspend_breaks_off_a_reset(core: DriverCore) -> None:
     """Its clock stood still meanwhile, and nobody waits for it any more."""
     core.on_frame(WATCHING, 10.0)
-    outcomes: list[Outcome] = []
+    outcomes: list[RequestOutcome] = []
     core.request_reset(10.0, outcomes.append)
     core.on_suspend(10.0)
-    assert outcomes == [Outcome(False, "broken off: the computer was suspended; reset again")]
+    assert outcomes == [RequestOutcome(False, "broken off: the computer was suspended; reset again")]
 
 
 def test_a_shutdown_breaks_off_a_reset_and_tells_its_caller(core: DriverCore) -> None:
     core.on_frame(WATCHING, 10.0)
-    outcomes: list[Outcome] = []
+    outcomes: list[RequestOutcome] = []
     core.request_reset(10.0, outcomes.append)
     core.request_shutdown()
-    assert outcomes == [Outcome(False, "broken off: motor_driver is shutting down")]
+    assert outcomes == [RequestOutcome(False, "broken off: motor_driver is shutting down")]
     frames = core.tick(10.01)
     assert core.finished
     assert not [frame for frame in frames if frame.cob_id == 0x000]  # of no drive is known that its power is off
     core.request_reset(10.02, outcomes.append)
-    assert outcomes[1] == Outcome(False, "refused: motor_driver is shutting down")
+    assert outcomes[1] == RequestOutcome(False, "refused: motor_driver is shutting down")
 
 
 def test_a_shutdown_begins_no_boot(core: DriverCore) -> None:

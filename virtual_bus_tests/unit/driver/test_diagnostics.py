@@ -9,7 +9,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from canbase_config.health import Health
-from canbase_driver.causes import Cause, Finding
+from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.drives.drive_values import NamedValue
@@ -122,12 +122,14 @@ def test_the_values_are_short_and_have_their_units() -> None:
     ],
 )
 def test_the_level_of_the_driver_follows_its_state(state: DriverState, level: bytes) -> None:
-    message = diagnostics_message(with_driver(state=state, finding={"cause": Cause.BOOTING}), STAMP)
+    message = diagnostics_message(with_driver(state=state, finding={"cause": DriverCause.BOOTING}), STAMP)
     assert entry(message, "robot: motor_driver").level == level
 
 
 def test_a_drive_that_is_missing_is_an_error() -> None:
-    message = diagnostics_message(with_driver(state=DriverState.BOOTING, finding={"cause": Cause.DRIVE_MISSING}), STAMP)
+    message = diagnostics_message(
+        with_driver(state=DriverState.BOOTING, finding={"cause": DriverCause.DRIVE_MISSING}), STAMP
+    )
     assert entry(message, "robot: motor_driver").level == ERROR
 
 
@@ -140,7 +142,7 @@ def test_a_drive_that_is_missing_is_an_error() -> None:
     ],
 )
 def test_a_stopped_driver_says_why_and_what_ends_it(detail: str, clears_on: str, sentence: str) -> None:
-    snapshot = with_driver(state=DriverState.LATCHED, finding=Finding(Cause.DRIVE_FAULT, detail, clears_on))
+    snapshot = with_driver(state=DriverState.LATCHED, finding=Finding(DriverCause.DRIVE_FAULT, detail, clears_on))
     assert entry(diagnostics_message(snapshot, STAMP), "robot: motor_driver").message == sentence
 
 
@@ -303,7 +305,7 @@ def test_before_that_nobody_knows(state: DriverState) -> None:
 
 def test_a_value_beyond_a_limit_of_health_is_a_warning_of_its_drive_alone() -> None:
     hot = with_left(temperature_c=91.0)
-    warnings = HealthWatch(Health(temperature_high_c=80.0)).look(hot.drives, 0.0)
+    warnings = HealthWatch(Health(temperature_high_c=80.0)).check_drives(hot.drives, 0.0)
     message = diagnostics_message(hot, STAMP, warnings=warnings)
     left, right = (entry(message, f"robot: drive {side}_wheel_joint") for side in ("left", "right"))
     assert (left.level, right.level) == (WARN, OK)

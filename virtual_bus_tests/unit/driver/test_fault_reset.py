@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_driver.supervision.fault_reset import FAULT_TRIES, Outcome, Reset, ResetPhase, refusal
+from canbase_driver.supervision.fault_reset import FAULT_TRIES, RequestOutcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import ANSWERS
 from canbase_runtime.watchdog_view import WatchdogView
@@ -28,7 +28,7 @@ class Story:
         self.reset = Reset(self.now_s, cycle_s, boot_s=10.0)
         self.phases: list[tuple[float, ResetPhase]] = []
 
-    def run(self, situation: Situation, seconds: float, answer: int | None = NOT_TRIPPED) -> Outcome | None:
+    def run(self, situation: Situation, seconds: float, answer: int | None = NOT_TRIPPED) -> RequestOutcome | None:
         """Step until it ends, or for so long."""
         for _ in range(round(seconds / self.cycle_s)):
             self.now_s += self.cycle_s
@@ -59,7 +59,7 @@ def in_phase(phase: ResetPhase) -> Story:
     raise AssertionError(story.reset.phase)
 
 
-def sentence(outcome: Outcome | None) -> str:
+def sentence(outcome: RequestOutcome | None) -> str:
     """The sentence of a reset that has failed."""
     assert outcome is not None
     assert not outcome.done
@@ -116,7 +116,7 @@ def test_with_nothing_else_wrong_it_is_done_two_cycles_after_the_watchdogs_answe
     assert story.run(WELL, 0.1, answer=None) is None
     assert story.run(WELL, 0.02, answer) is None
     outcome = story.run(WELL, 0.01, answer)
-    assert outcome == Outcome(True, "Reset. The drives are enabled once every velocity command is zero")
+    assert outcome == RequestOutcome(True, "Reset. The drives are enabled once every velocity command is zero")
 
 
 @pytest.mark.parametrize(

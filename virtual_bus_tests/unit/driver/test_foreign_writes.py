@@ -41,7 +41,7 @@ from canbase_driver.drives.foreign_writes import ForeignWrites
     ],
 )
 def test_the_object_is_named_that_decides_how_the_drive_stops(data: str, shown: str) -> None:
-    assert ForeignWrites().take(Frame(0x581, bytes.fromhex(data))) == shown
+    assert ForeignWrites().take_sdo_answer(Frame(0x581, bytes.fromhex(data))) == shown
 
 
 # another client reads an object of 900 bytes in a block ── 127 segments, 2 more ── its end ── then a write
@@ -49,7 +49,7 @@ def test_the_segments_of_a_block_that_is_read_are_no_writes() -> None:
     foreign = ForeignWrites()
 
     def taken(first: int) -> str:
-        return foreign.take(Frame(0x581, bytes((first, 0x16, 0x10, 1, 0, 0, 0, 0))))
+        return foreign.take_sdo_answer(Frame(0x581, bytes((first, 0x16, 0x10, 1, 0, 0, 0, 0))))
 
     assert taken(0xC6) == ""
     assert [number for number in range(1, 128) if taken(number)] == []

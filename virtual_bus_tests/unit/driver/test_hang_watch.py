@@ -8,13 +8,13 @@ TIMEOUT_S, LOOK_S = 0.5, 0.1
 
 
 def looks(watch: HangWatch, cycle_at: float, times: list[float]) -> list[bool]:
-    return [watch.look(cycle_at, now_s) is not None for now_s in times]
+    return [watch.check_cycle(cycle_at, now_s) is not None for now_s in times]
 
 
 def test_a_control_thread_without_a_cycle_hangs_after_the_timeout() -> None:
     watch = HangWatch(TIMEOUT_S, LOOK_S)
     assert looks(watch, 10.0, [10.0, 10.1, 10.2, 10.3, 10.4, 10.5]) == [False] * 6
-    failure = watch.look(10.0, 10.61)
+    failure = watch.check_cycle(10.0, 10.61)
     assert failure is not None
     assert "no cycle for 0.6 s" in str(failure)
 

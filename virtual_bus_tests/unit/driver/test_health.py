@@ -22,7 +22,7 @@ STAMP = Time(sec=7)
 def watched(values: dict[str, Any], limits: Health = LIMITS) -> tuple[str, ...]:
     """The keys that a left drive with these values is warned of."""
     drives = (dataclasses.replace(LEFT, **values), RIGHT)
-    return tuple(excess.key for excess in HealthWatch(limits).look(drives, 0.0))
+    return tuple(excess.key for excess in HealthWatch(limits).check_drives(drives, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -50,9 +50,9 @@ def test_a_value_beyond_its_limit_is_a_warning_and_one_that_is_not_measured_is_n
 
 
 def test_the_sentence_names_joint_value_limit_and_key() -> None:
-    (low,) = HealthWatch(LIMITS).look((dataclasses.replace(LEFT, voltage_v=21.318),), 0.0)
+    (low,) = HealthWatch(LIMITS).check_drives((dataclasses.replace(LEFT, voltage_v=21.318),), 0.0)
     assert low.text == "left_wheel_joint: supply 21.32 V is below health.voltage_low_v (22 V)"
-    (hot,) = HealthWatch(LIMITS).look((dataclasses.replace(LEFT, temperature_c=81.0),), 0.0)
+    (hot,) = HealthWatch(LIMITS).check_drives((dataclasses.replace(LEFT, temperature_c=81.0),), 0.0)
     assert hot.text == "left_wheel_joint: temperature 81 °C is above health.temperature_high_c (80 °C)"
 
 
@@ -61,7 +61,7 @@ def test_a_value_at_its_limit_is_one_warning_until_it_has_been_inside_for_a_whil
     watch = HealthWatch(LIMITS)
 
     def warned(temperature_c: float, now_s: float) -> bool:
-        return bool(watch.look((dataclasses.replace(LEFT, temperature_c=temperature_c),), now_s))
+        return bool(watch.check_drives((dataclasses.replace(LEFT, temperature_c=temperature_c),), now_s))
 
     assert warned(81.0, 0.0)
     assert warned(79.0, 0.1)
@@ -74,9 +74,9 @@ def test_a_value_at_its_limit_is_one_warning_until_it_has_been_inside_for_a_whil
 def test_each_drive_and_each_limit_has_its_own_warning() -> None:
     watch = HealthWatch(LIMITS)
     hot = [dataclasses.replace(drive, temperature_c=90.0) for drive in (LEFT, RIGHT)]
-    assert [excess.joint for excess in watch.look(hot, 0.0)] == ["left_wheel_joint", "right_wheel_joint"]
+    assert [excess.joint for excess in watch.check_drives(hot, 0.0)] == ["left_wheel_joint", "right_wheel_joint"]
     weak = [dataclasses.replace(LEFT, voltage_v=20.0), RIGHT]
-    assert len(watch.look(weak, 1.0)) == 3
+    assert len(watch.check_drives(weak, 1.0)) == 3
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_what_is_not_known_of_the_battery_is_nan_as_its_interface_wants_it() -> 
 
 def test_the_status_has_the_warnings_of_each_drive() -> None:
     snapshot = with_driver(drives=(dataclasses.replace(LEFT, temperature_c=90.0, voltage_v=20.0), RIGHT))
-    warnings = HealthWatch(LIMITS).look(snapshot.drives, 0.0)
+    warnings = HealthWatch(LIMITS).check_drives(snapshot.drives, 0.0)
     left, right = messages.status_message(snapshot, STAMP, warnings).drives
     assert left.health == "; ".join(warning.text for warning in warnings)
     assert (left.temperature_c, left.voltage_v, right.health) == (90.0, 20.0, "")

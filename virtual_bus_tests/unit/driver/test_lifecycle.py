@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.supervision.fault_reset import Outcome
+from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.latch_record import Mark
@@ -58,7 +58,7 @@ def test_activated_they_have_power_and_follow_once_zero_was_commanded(released: 
 def test_deactivated_at_speed_the_wheels_stand_before_the_power_goes_and_before_it_is_done() -> None:
     world = World()
     world.drive()
-    outcomes: list[Outcome] = []
+    outcomes: list[RequestOutcome] = []
     world.core.request_aim(Aim.CONFIGURED, world.now_s, outcomes.append)
     world.run(5.0, lambda: not any(world.powered))
     assert world.truth.standing_s > 0.0
@@ -149,7 +149,7 @@ def test_an_activation_that_fails_is_taken_back_and_says_why(released: World) ->
 
 def test_a_reset_of_an_unconfigured_driver_is_refused(released: World) -> None:
     released.run(0.1)
-    assert released.reset() == Outcome(False, "refused: lifecycle: unconfigured; configure it first")
+    assert released.reset() == RequestOutcome(False, "refused: lifecycle: unconfigured; configure it first")
 
 
 def test_a_driver_that_shuts_down_obeys_a_deactivation_and_its_record_keeps_it() -> None:

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from rclpy.serialization import deserialize_message, serialize_message
 
 from canbase_config.odometry import OdometrySettings
-from canbase_driver.causes import Cause, Finding
+from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.motion.odometry import Odometry, Pose2D
 from canbase_driver.motion.pose_error import TwistError
@@ -128,8 +128,9 @@ def test_the_status_carries_every_field_of_the_snapshot_that_the_interface_has()
     bus = BusReport(ControllerState.ERROR_WARNING, 21, 22, 23, 24, 25, "network is down")
     message = messages.status_message(
         with_driver(
-            state=DriverState.LATCHED, finding=Finding(Cause.DRIVE_FAULT, "left_wheel_joint is in fault", "reset"),
-            watchdog=watchdog, bus=bus, odometry={"travel_losses": 31, "pose_resets": 32}, standstill=True,
+            finding=Finding(DriverCause.DRIVE_FAULT, "left_wheel_joint is in fault", "reset"),
+            state=DriverState.LATCHED, watchdog=watchdog, bus=bus,
+            odometry={"travel_losses": 31, "pose_resets": 32}, standstill=True,
         ),
         STAMP,
         bus_load=0.27,

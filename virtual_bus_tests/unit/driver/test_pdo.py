@@ -44,7 +44,7 @@ def test_two_axes_on_one_node() -> None:
 
 def test_two_axes_with_one_tpdo_each() -> None:
     layout = NodeLayout(5, (0, 1), NARROW, joins_velocity=True)
-    assert [pdo for pdo in layout.pdos() if pdo.is_heard] == [
+    assert [pdo for pdo in layout.pdos() if pdo.is_received] == [
         Pdo("TPDO", 1, 0x185, 1, (0x6041_00_10, 0x6064_00_20, 0x606C_00_10)),
         Pdo("TPDO", 2, 0x385, 1, (0x6841_00_10, 0x6864_00_20, 0x686C_00_10)),
     ]

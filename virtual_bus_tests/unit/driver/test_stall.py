@@ -26,12 +26,12 @@ class Story:
         share: float | None = 1.0,
         ordered: float = 0.3,
         *,
-        lives: bool = False,
+        moves: bool = False,
         gap_s: float = CYCLE_S,
     ) -> bool:
         for _ in range(count):
             self.now_s += gap_s
-            self.stall.on_sample(speed, share, ordered, lives=lives, now_s=self.now_s)
+            self.stall.on_sample(speed, share, ordered, moves=moves, now_s=self.now_s)
         return self.stall.is_over
 
 
@@ -63,7 +63,7 @@ def test_unknown_torque_is_no_evidence() -> None:
 def test_a_sign_of_life_begins_the_time_anew() -> None:
     story = Story()
     story.samples(19)
-    story.samples(1, lives=True)
+    story.samples(1, moves=True)
     assert story.stall.time_s == 0.0
     assert not story.samples(19)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from canbase_config.load import load_robot, sample
-from canbase_driver.causes import Cause, Finding
+from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.cia402 import PowerGoal
 from canbase_driver.motion.braking import Braking
 from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS
@@ -288,7 +288,7 @@ def test_no_power_before_the_record_is_on_disk() -> None:
 
 
 def test_a_stop_of_before_the_start_is_latched_until_a_reset() -> None:
-    before = Finding(Cause.DRIVE_FAULT, "latched since before the start: left_wheel", "reset")
+    before = Finding(DriverCause.DRIVE_FAULT, "latched since before the start: left_wheel", "reset")
     state_machine = StateMachine(Braking(load_robot(sample("bench")).robot), 3.0, before)
     for step in range(100):
         orders = state_machine.step(READY, 10.0 + step)
@@ -315,14 +315,14 @@ def just_after(now_s: float) -> float:
 
 
 def test_drives_may_take_a_whole_second_to_be_switched_on() -> None:
-    assert exact((8.0, STO_OPEN), (9.0, STO_OPEN)).finding.cause is Cause.PREPARING
-    assert exact((8.0, STO_OPEN), (just_after(9.0), STO_OPEN)).finding.cause is Cause.DRIVE_NOT_READY
+    assert exact((8.0, STO_OPEN), (9.0, STO_OPEN)).finding.cause is DriverCause.PREPARING
+    assert exact((8.0, STO_OPEN), (just_after(9.0), STO_OPEN)).finding.cause is DriverCause.DRIVE_NOT_READY
 
 
 def test_drives_may_take_two_seconds_to_operation_enabled_and_then_it_is_a_quick_stop() -> None:
     assert exact((8.0, READY), (10.0, READY)).phase is Phase.ENABLING
     late = exact((8.0, READY), (just_after(10.0), READY))
-    assert (late.phase, late.finding.cause, late.latches) == (Phase.QUICK_STOP, Cause.ENABLE_TIMEOUT, True)
+    assert (late.phase, late.finding.cause, late.latches) == (Phase.QUICK_STOP, DriverCause.ENABLE_TIMEOUT, True)
 
 
 # 8 s enabled ── 9 s stop requested ── 12 s the ramp has had its 3 s
@@ -351,7 +351,7 @@ def test_after_a_reset_the_time_for_the_drives_begins_anew() -> None:
     for now_s in (20.0, 21.0, 21.25):
         state_machine.step(STO_OPEN, now_s)
         causes.append(state_machine.finding.cause)
-    assert causes == [Cause.PREPARING, Cause.PREPARING, Cause.DRIVE_NOT_READY]
+    assert causes == [DriverCause.PREPARING, DriverCause.PREPARING, DriverCause.DRIVE_NOT_READY]
 
 
 @pytest.mark.parametrize("powered", [False, True])
@@ -365,5 +365,5 @@ def test_a_shutdown_in_motion_ends_once_the_power_is_off(powered: bool) -> None:
             break
         state_machine.step(replace(stop, powered=powered), 9.0 + cycle / 128)
     assert state_machine.finished
-    assert (state_machine.state, state_machine.finding.cause) == (DISARMED, Cause.SHUTDOWN)
+    assert (state_machine.state, state_machine.finding.cause) == (DISARMED, DriverCause.SHUTDOWN)
     assert cycle == (35 if powered else 2)

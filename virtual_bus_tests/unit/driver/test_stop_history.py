@@ -46,7 +46,7 @@ def held(cause: str, at_s: float) -> StopRecord:
 def driving() -> StopHistory:
     """A recorder that has seen the base drive at 0.5 m/s until 999.99 s."""
     recorder = StopHistory(PATIENCE_S)
-    recorder.on_command(True, 999.98)
+    recorder.note_velocity_command(True, 999.98)
     assert recorder.on_snapshot(seen(999.99), []) == []
     return recorder
 
@@ -136,8 +136,8 @@ def test_a_source_that_is_lost_while_it_orders_motion_is_a_stop_and_one_that_end
     ordered_at: float, told: int
 ) -> None:
     recorder = StopHistory(PATIENCE_S)
-    recorder.on_command(True, ordered_at)
-    recorder.on_command(False, ordered_at + 0.02)
+    recorder.note_velocity_command(True, ordered_at)
+    recorder.note_velocity_command(False, ordered_at + 0.02)
     recorder.on_snapshot(seen(999.99), [])
     recorder.on_mux("joystick", "", 999.9)
     recorder.on_mux("", "joystick: no message for 0.31 s", 1000.0)
@@ -161,7 +161,7 @@ def test_commands_that_end_while_the_base_moves_are_a_stop_of_the_driver(
     state: DriverState, moved_at: float, told: int
 ) -> None:
     recorder = StopHistory(PATIENCE_S)
-    recorder.on_command(True, moved_at)
+    recorder.note_velocity_command(True, moved_at)
     recorder.on_snapshot(seen(999.99), [])
     recorder.on_snapshot(seen(1000.1, state=state, silent_s=0.21), [])
     reports = recorder.on_snapshot(seen(1000.4, standstill=True, silent_s=0.51), [])
@@ -193,7 +193,7 @@ def told_by_the_chain(world: World, seconds: float) -> list[StopReport]:
     reports: list[StopReport] = []
     for _ in range(round(seconds / 0.02)):
         if world.command is not None:
-            recorder.on_command(world.command != Twist2D.ZERO, world.now_s)
+            recorder.note_velocity_command(world.command != Twist2D.ZERO, world.now_s)
         world.run(0.02)
         stops = list(world.core.stops)
         world.core.stops.clear()
@@ -227,7 +227,7 @@ def test_in_the_chain_commands_that_end_are_one_stop_and_those_that_go_to_zero_a
     world.command = FORWARD
     assert told_by_the_chain(world, 1.0) == []
     recorder = StopHistory(PATIENCE_S)
-    recorder.on_command(True, world.now_s)
+    recorder.note_velocity_command(True, world.now_s)
     recorder.on_snapshot(world.snapshot, [])
     world.command = None
     reports: list[StopReport] = []

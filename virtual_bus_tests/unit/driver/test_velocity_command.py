@@ -7,17 +7,17 @@ import math
 import pytest
 
 from canbase_driver.motion.kinematics import Twist2D
-from canbase_driver.motion.velocity_command import Command
+from canbase_driver.motion.velocity_command import VelocityCommand
 from canbase_driver.supervision.cycle_stats import CycleStats
 
 FORWARD = Twist2D(0.3, 0.1)
 
 
-def command(*twists: Twist2D) -> Command:
+def command(*twists: Twist2D) -> VelocityCommand:
     """These have come at 10.0 s."""
-    made = Command(timeout_s=0.2)
+    made = VelocityCommand(timeout_s=0.2)
     for twist in twists:
-        made.take(twist, 10.0)
+        made.accept(twist, 10.0)
     return made
 
 
@@ -38,8 +38,8 @@ def test_await_zero_forgets_the_zero_that_was_seen() -> None:
     made = command(Twist2D.ZERO, FORWARD)
     made.await_zero()
     assert made.target(10.0) == Twist2D.ZERO
-    made.take(Twist2D.ZERO, 10.1)
-    made.take(FORWARD, 10.1)
+    made.accept(Twist2D.ZERO, 10.1)
+    made.accept(FORWARD, 10.1)
     assert made.target(10.1) == FORWARD
 
 
@@ -61,7 +61,7 @@ def test_what_is_not_finite_is_refused_counted_and_changes_nothing(bad: float, p
     made = command(Twist2D.ZERO, FORWARD)
     values = [0.1, 0.1]
     values[place] = bad
-    assert not made.take(Twist2D(*values), 10.15)
+    assert not made.accept(Twist2D(*values), 10.15)
     assert (made.refused, made.target(10.1)) == (1, FORWARD)
     assert made.report(10.15).events == {"commands_refused": 1}
     assert made.report(10.15).age_s == pytest.approx(0.15)

@@ -10,7 +10,7 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
 from prometheus_client.parser import text_string_to_metric_families as plain_families
 
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_fleet.exposition import Exposition
 from canbase_fleet.robot_view import MOST_STOPS, OTHER, RobotView, counted
 from canbase_runtime.driver_state import DriverState
@@ -68,7 +68,7 @@ def test_of_the_states_of_the_driver_exactly_one_holds(state: DriverState) -> No
 def test_a_cause_that_the_interface_does_not_have_is_none_of_the_known_ones() -> None:
     """So `canbase_driver_cause{canbase_driver_cause="none"} == 0` still tells that something is wrong."""
     found = values(well(driver=driver(cause="by magic")), "canbase_driver_cause")
-    assert len(found) == len(Cause)
+    assert len(found) == len(DriverCause)
     assert not any(found.values())
     assert values(well(safety=safety(cause="by magic")), "canbase_filter_cause")[("unknown",)] == 1.0
     assert not any(values(well(safety=safety(action=9)), "canbase_filter_action").values())

@@ -11,7 +11,7 @@ import pytest
 from canbase.msg import DriverStatus, ForeignPublisher, MuxLock, SafetyState, ScannerState
 from jsonschema import Draft202012Validator
 
-from canbase_driver.causes import Cause
+from canbase_driver.causes import DriverCause
 from canbase_fleet.robot_view import RobotView
 from canbase_fleet.safety_state import EStop, driving, estop, field_violation
 from canbase_fleet.vda5050 import essence, line, state
@@ -173,9 +173,9 @@ def test_each_failure_is_an_error_with_its_level(changes: dict[str, Any], kind: 
     assert types(well(**changes))[kind] == level
 
 
-@pytest.mark.parametrize("cause", Cause)
+@pytest.mark.parametrize("cause", DriverCause)
 @pytest.mark.parametrize("number", [number for number in DriverState if number is not DriverState.ENABLED])
-def test_without_power_there_is_always_an_error(cause: Cause, number: DriverState) -> None:
+def test_without_power_there_is_always_an_error(cause: DriverCause, number: DriverState) -> None:
     assert "driver_not_enabled" in types(well(driver=driver(state=int(number), cause=cause.value)))
 
 

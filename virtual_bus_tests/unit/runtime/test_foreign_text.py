@@ -9,7 +9,7 @@ from std_msgs.msg import Header
 
 from canbase_action_server.messages import mux_in, safety_in
 from canbase_runtime.foreign_text import CUT, clean, printable
-from canbase_runtime.journal import Journal, Voice
+from canbase_runtime.journal import EventLog, Journal
 from canbase_runtime.log_priority import Priority
 from canbase_velocity.placement import PlacementError, placed_by_tf
 
@@ -65,7 +65,7 @@ class Log:
 def test_whatever_a_part_says_is_one_line_of_its_log() -> None:
     log = Log()
     for priority in (Priority.ERROR, Priority.WARNING, Priority.INFO):
-        Voice(log, Journal("x", {})).tell(f"scan: {FORGED}", priority)
+        EventLog(log, Journal("x", {})).write(f"scan: {FORGED}", priority)
     assert len(log.lines) == 3
     assert all(line.isprintable() for line in log.lines)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from canbase_runtime.journal import VOICE_BURST, VOICE_PER_S, Journal, Voice
+from canbase_runtime.journal import EVENT_LOG_BURST, EVENT_LOG_PER_S, EventLog, Journal
 from canbase_runtime.log_priority import Priority
 from canbase_watchdog.log import formatter
 
@@ -31,7 +31,7 @@ def listener(path: str) -> Iterator[socket.socket]:
 
 
 def test_an_entry_has_message_priority_part_and_fields(path: str, listener: socket.socket) -> None:
-    Journal("motor_driver", UNDER_SYSTEMD, path).tell("LATCHED", Priority.WARNING, cause="drive fault", node_id=1)
+    Journal("motor_driver", UNDER_SYSTEMD, path).write("LATCHED", Priority.WARNING, cause="drive fault", node_id=1)
     assert listener.recv(1000).decode().splitlines() == [
         "MESSAGE=LATCHED",
         "PRIORITY=4",
@@ -43,20 +43,20 @@ def test_an_entry_has_message_priority_part_and_fields(path: str, listener: sock
 
 
 def test_a_line_break_cannot_make_a_field_of_its_own(path: str, listener: socket.socket) -> None:
-    Journal("x", UNDER_SYSTEMD, path).tell("one\nPRIORITY=0", Priority.INFO)
+    Journal("x", UNDER_SYSTEMD, path).write("one\nPRIORITY=0", Priority.INFO)
     assert listener.recv(1000).decode().splitlines()[:2] == ["MESSAGE=one\\nPRIORITY=0", "PRIORITY=6"]
 
 
 def test_outside_of_systemd_nothing_is_sent(path: str, listener: socket.socket) -> None:
-    Journal("x", {}, path).tell("text", Priority.INFO)
+    Journal("x", {}, path).write("text", Priority.INFO)
     with pytest.raises(BlockingIOError):
         listener.recv(1000)
 
 
 def test_a_journal_that_is_gone_or_full_costs_nothing(path: str, listener: socket.socket) -> None:
-    Journal("x", UNDER_SYSTEMD, path + "gone").tell("text", Priority.INFO)
+    Journal("x", UNDER_SYSTEMD, path + "gone").write("text", Priority.INFO)
     for _ in range(2000):
-        Journal("x", UNDER_SYSTEMD, path).tell("text " * 100, Priority.INFO)
+        Journal("x", UNDER_SYSTEMD, path).write("text " * 100, Priority.INFO)
 
 
 class HeardLogger:
@@ -83,7 +83,7 @@ def test_a_voice_is_heard_in_the_log_of_ros_and_in_the_journal(
     path: str, listener: socket.socket, priority: Priority, severity: str
 ) -> None:
     logger = HeardLogger()
-    Voice(logger, Journal("velocity_mux", UNDER_SYSTEMD, path)).tell("nav drives", priority, active="nav")
+    EventLog(logger, Journal("velocity_mux", UNDER_SYSTEMD, path)).write("nav drives", priority, active="nav")
     assert logger.lines == [(severity, "nav drives")]
     entry = listener.recv(1000).decode().splitlines()
     assert entry[:2] == ["MESSAGE=nav drives", f"PRIORITY={int(priority)}"]
@@ -94,14 +94,14 @@ def test_a_flood_of_lines_is_cut_off_and_errors_are_not(path: str, monkeypatch: 
     now_s = 5.0
     monkeypatch.setattr("canbase_runtime.journal.time.monotonic", lambda: now_s)
     logger = HeardLogger()
-    voice = Voice(logger, Journal("velocity_mux", {}, path))
+    log = EventLog(logger, Journal("velocity_mux", {}, path))
     for _ in range(10_000):
-        voice.tell("lock pause is set", Priority.NOTICE)
-    assert len(logger.lines) == VOICE_BURST
-    voice.tell("defect", Priority.ERROR)
+        log.write("lock pause is set", Priority.NOTICE)
+    assert len(logger.lines) == EVENT_LOG_BURST
+    log.write("defect", Priority.ERROR)
     assert logger.lines[-1] == ("ERROR", "defect")
-    now_s += 1.5 / VOICE_PER_S
-    voice.tell("nav drives", Priority.INFO)
+    now_s += 1.5 / EVENT_LOG_PER_S
+    log.write("nav drives", Priority.INFO)
     assert logger.lines[-2:] == [("WARN", "9800 lines omitted: more than 20 each second"), ("INFO", "nav drives")]
 
 

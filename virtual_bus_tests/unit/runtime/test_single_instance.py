@@ -33,7 +33,7 @@ TAKES: Mapping[str, tuple[Take, type[Exception], str]] = {
     "watchdog": (
         lambda name: sole.hold_bus(_bus(name)),
         sole.TakenError,
-        "from canbase_watchdog.single_instance import take; held = take({bus})",
+        "from canbase_watchdog.single_instance import hold_bus; held = hold_bus({bus})",
     ),
 }
 

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 import canbase_hazards
 from canbase_commissioning import calibration
-from canbase_driver.drives import canopen_node, let_go
+from canbase_driver.drives import canopen_node, release_test
 from canbase_driver.drives.stopping_distance import StoppingDistance
 from canbase_driver.motion.odometry import WheelTravel
 from canbase_driver.motion.slip import SideSlip
@@ -131,8 +131,8 @@ def boot_waits_a_bounded_time() -> None:
         node._boot_up_at, node._reset_at = now_s - gap_s, now_s - gap_s
         node._learn_to_settle(now_s)
         node._learn_to_wait("it answered", now_s)
-    assert node._patience.settle_s == pytest.approx(4.1)
-    assert node._patience.boot_up_s == pytest.approx(39.5)
+    assert node._learned.settle_s == pytest.approx(4.1)
+    assert node._learned.boot_up_s == pytest.approx(39.5)
 
 
 def floor_follows_the_grip() -> None:
@@ -154,10 +154,10 @@ def travel_is_bounded() -> None:
 
 
 def jitter_is_no_life_for_the_driver() -> None:
-    push = let_go.Push(0.05, 1e-5)
+    push = release_test.TorqueEvidence(0.05, 1e-5)
     for at in range(OFTEN):
-        push.on_sample(RANDOM.choice((0.0, 0.99 * let_go.LIFE_M)), 1.0, 0.5, True, 0.01 * at)
-    assert push.must_let_go
+        push.on_sample(RANDOM.choice((0.0, 0.99 * release_test.LIFE_M)), 1.0, 0.5, True, 0.01 * at)
+    assert push.must_release
 
 
 def jitter_is_no_life_for_the_watchdog() -> None:
@@ -226,10 +226,10 @@ HOSTILE: dict[str, Callable[[], None]] = {
     "Delay._least_s": delay_is_never_forgotten,
     "GlitchFilter._before_m": glitch_filter_delays_by_one_scan,
     "HeldPlacement._first": first_place_stays,
-    "CanopenNode._patience": boot_waits_a_bounded_time,
+    "CanopenNode._learned": boot_waits_a_bounded_time,
     "SideSlip._floor_mps": floor_follows_the_grip,
     "WheelTravel._accepted_raw": travel_is_bounded,
-    "Push._low_m Push._high_m": jitter_is_no_life_for_the_driver,
+    "TorqueEvidence._low_m TorqueEvidence._high_m": jitter_is_no_life_for_the_driver,
     "Life._low_m Life._high_m": jitter_is_no_life_for_the_watchdog,
     "StoppingDistance._distance_m StoppingDistance._hardest_mps2": to_and_fro_is_no_distance_for_the_driver,
     "StoppingDistance._way_m": to_and_fro_is_no_distance_for_the_watchdog,

@@ -131,7 +131,7 @@ def by_the_driver() -> Callable[[bytes], bytes | None]:
     answers = of_the_driver.GuardAnswers()
 
     def take(data: bytes) -> bytes | None:
-        found = answers.take(DriverFrame(0x701, data))
+        found = answers.take_answer(DriverFrame(0x701, data))
         return None if found is None else found.data
 
     return take

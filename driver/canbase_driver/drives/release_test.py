@@ -35,51 +35,51 @@ RETURN_S = 1.0
 """From the power off until all drives are enabled again; then one that is not is a failure."""
 
 
-class Push:
+class TorqueEvidence:
     """How hard a drive pushes at a wheel that shows no motion, and whether any was ordered since its last release."""
 
     def __init__(self, limit_s: float, m_per_count: float) -> None:
         """`limit_s`: time at rated torque, or longer at less."""
         self._limit_s = limit_s
         self._life_m = max(LIFE_M, LIFE_COUNTS * abs(m_per_count))
-        self._seen_m = self._at_m = self._low_m = self._high_m = self.pushed_s = 0.0
+        self._travel_m = self._at_m = self._low_m = self._high_m = self.pushed_s = 0.0
         """Where it is, and between which places it has been, from that of its last sign of life on."""
         self._at = math.inf
-        self._owes = self._tells = False
+        self._release_due = self._reports_torque = False
         self._count_m, self._counted_m = LIFE_COUNTS * abs(m_per_count), 0.0
         self._unasked_s = self._held_share = 0.0
         """The change of the torque with nothing ordered, as time at rated torque; and what held the wheel before."""
         self._settles_s = SETTLES_S
-        self.lives = True
+        self.encoder_moves = True
         """The last sample was a sign of life of the encoder, or the drive had no torque."""
         self.share: float | None = None
         """Torque, of the rated one; None: the drive does not report it, or has only ever reported zero."""
 
     @property
-    def must_let_go(self) -> bool:
+    def must_release(self) -> bool:
         """With nothing ordered, only a release shows whether the wheel is at standstill."""
-        return (self._owes and self.pushed_s >= self._limit_s) or self._unasked_s >= self._limit_s
+        return (self._release_due and self.pushed_s >= self._limit_s) or self._unasked_s >= self._limit_s
 
     def on_sample(
         self, travel_m: float, share: float | None, ordered_mps: float, has_torque: bool, now_s: float
     ) -> None:
         """Encoder and torque of one SYNC, and what an enabled drive was ordered before it."""
         elapsed_s, self._at = min(max(now_s - self._at, 0.0), LONGEST_SAMPLE_GAP_S), now_s
-        self._tells = self._tells or bool(share)
-        self.share = share if self._tells else None
+        self._reports_torque = self._reports_torque or bool(share)
+        self.share = share if self._reports_torque else None
         torque = 1.0 if self.share is None else abs(self.share)
         given_s = torque * elapsed_s if torque >= NOISE_SHARE else 0.0
-        self._at_m, self._seen_m = self._at_m + travel_m - self._seen_m, travel_m
+        self._at_m, self._travel_m = self._at_m + travel_m - self._travel_m, travel_m
         self._low_m, self._high_m = min(self._low_m, self._at_m), max(self._high_m, self._at_m)
-        self.lives = self._high_m - self._low_m >= self._life_m or not has_torque
-        if self.lives:
+        self.encoder_moves = self._high_m - self._low_m >= self._life_m or not has_torque
+        if self.encoder_moves:
             self._at_m = self._low_m = self._high_m = self.pushed_s = 0.0
         else:
             self.pushed_s = min(self.pushed_s + given_s, self._limit_s)
-        self._owes = has_torque and (self._owes or ordered_mps != 0.0)
+        self._release_due = has_torque and (self._release_due or ordered_mps != 0.0)
         counts = abs(travel_m - self._counted_m) >= self._count_m
         self._counted_m = travel_m if counts else self._counted_m
-        self._note_change(counts or self._owes or not has_torque, elapsed_s)
+        self._note_change(counts or self._release_due or not has_torque, elapsed_s)
 
     def _note_change(self, begins: bool, elapsed_s: float) -> None:
         """`begins`: what the torque is from now on is what holds the wheel."""
@@ -109,33 +109,33 @@ class Wheel(Protocol):
         """Measured."""
 
     @property
-    def push(self) -> Push:
+    def torque_evidence(self) -> TorqueEvidence:
         """Of its drive."""
 
 
-class LetGoPhase(Enum):
+class ReleasePhase(Enum):
     """See the drawing at the head of this file."""
 
     HELD = "held"
-    LETTING_GO = "letting go"
+    RELEASING = "letting go"
     RETURNING = "returning"
 
 
-class LetGo:
+class ReleaseTest:
     """All drives release together: the base keeps its heading, and none is enabled beside one that is not."""
 
     def __init__(self, robot: Robot) -> None:
         self._proves = robot.watchdog.stand_proof == "let_go"
         self._still_mps = robot.watchdog.motion_tolerance_mps
         self._disable_s = min(robot.watchdog.stand_answer_s, robot.timeouts.feedback_s) / 2.0
-        self._phase = LetGoPhase.HELD
+        self._phase = ReleasePhase.HELD
         self._since = -math.inf
         self._returned = True
 
     @property
     def active(self) -> bool:
         """Nothing is to be ordered."""
-        return self._phase is not LetGoPhase.HELD
+        return self._phase is not ReleasePhase.HELD
 
     def excuses(self, now_s: float) -> bool:
         """A drive that is not enabled is so because of this; also on the ramp of a stop that took over."""
@@ -145,21 +145,21 @@ class LetGo:
         """Something else decides about the power. `ramps`: it is the ramp, on which drives that have none yet are not
         to be taken for failed ones. Once the power is off, the next that lose it have no excuse.
         """
-        self._phase = LetGoPhase.HELD
+        self._phase = ReleasePhase.HELD
         self._returned = self._returned or not ramps
 
     def step(self, wheels: Sequence[Wheel], rests: bool, now_s: float) -> None:
         """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""
-        if self._phase is LetGoPhase.HELD and rests and self._is_due(wheels):
-            self._phase, self._since, self._returned = LetGoPhase.LETTING_GO, now_s, False
-        elif self._phase is LetGoPhase.LETTING_GO and all(
+        if self._phase is ReleasePhase.HELD and rests and self._is_due(wheels):
+            self._phase, self._since, self._returned = ReleasePhase.RELEASING, now_s, False
+        elif self._phase is ReleasePhase.RELEASING and all(
             wheel.state and not wheel.state.has_torque for wheel in wheels
         ):
-            self._phase = LetGoPhase.RETURNING
-        elif self._phase is LetGoPhase.RETURNING and all(
+            self._phase = ReleasePhase.RETURNING
+        elif self._phase is ReleasePhase.RETURNING and all(
             wheel.state is DriveState.OPERATION_ENABLED for wheel in wheels
         ):
-            self._phase, self._returned = LetGoPhase.HELD, True
+            self._phase, self._returned = ReleasePhase.HELD, True
 
     def goal(self, now_s: float) -> PowerGoal:
         """The commands to the drives: disable operation, and where that has no effect, disable voltage.
@@ -167,10 +167,10 @@ class LetGo:
         A wheel that a threshold releases at that moment turns, and its drive brakes it first (605Ch). None may have
         power beside one without it for as long as feedback_s: for the watchdog that is a drive that has failed.
         """
-        if self._phase is not LetGoPhase.LETTING_GO:
+        if self._phase is not ReleasePhase.RELEASING:
             return PowerGoal.ON
-        return PowerGoal.LET_GO if now_s - self._since <= self._disable_s else PowerGoal.READY
+        return PowerGoal.RELEASE if now_s - self._since <= self._disable_s else PowerGoal.READY
 
     def _is_due(self, wheels: Sequence[Wheel]) -> bool:
         stand = all(abs(wheel.velocity_mps) <= self._still_mps for wheel in wheels)
-        return self._proves and stand and any(wheel.push.must_let_go for wheel in wheels)
+        return self._proves and stand and any(wheel.torque_evidence.must_release for wheel in wheels)
