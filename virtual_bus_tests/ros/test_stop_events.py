@@ -127,7 +127,7 @@ def test_it_is_written_while_the_robot_drives_and_explain_export_and_replay_read
     assert "No stop was found" in text
     assert run("record", "export", str(out), "--mcap", str(tmp_path / "driving.mcap"))[0] == 0
     code, text = run("record", "replay", str(out))
-    assert code == 0, text
+    assert (code, text.count("cannot tell")) == (1, 2), "nothing tripped, so no part wrote its own file"
 
 
 def test_a_latched_stop_has_its_time_its_way_and_a_file_that_python_can_reads(robot: RunningRobot) -> None:
