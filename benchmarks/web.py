@@ -51,12 +51,7 @@ def drives(axes: int) -> list[dict[str, Any]]:
 
 def changes(axes: int) -> dict[str, Any]:
     """Of the sample robot.yaml."""
-    sources = {
-        "joystick": {"topic": "cmd_vel_joy", "priority": 100, "timeout_s": 0.3},
-        "web": {"topic": "cmd_vel_web", "priority": 90, "timeout_s": 0.3, "nodes": ["canbase_web"]},
-        "action": {"topic": "cmd_vel_action", "priority": 40, "timeout_s": 0.3, "nodes": ["drive_distance_server"]},
-    }
-    return {**PATIENT, "drives": drives(axes), "mux": {"sources": sources}}
+    return {**PATIENT, "drives": drives(axes)}
 
 
 class Site:
