@@ -14,7 +14,7 @@ function overview() {
   Plotly.react("overview", structuredClone(figure.data), dressed(figure.layout), config);
 }
 function curve() {
-  const which = document.getElementById("which").value, found = curves[which], unit = metric() == "time_s" ? "s" : "m";
+  const which = document.getElementById("which").value, found = curves[which], unit = metric() === "time_s" ? "s" : "m";
   const steps = found[metric()];
   Plotly.react("curve", [{type: "scatter", mode: "lines+markers", x: steps.map(s => s[0]), y: steps.map(s => 100 * s[1]),
     line: {shape: "hv", color: "#3b82c4"}, marker: {size: 4}, hovertemplate: "%{y:.1f} % within %{x:.3f} " + unit + "<extra></extra>"}],
