@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,6 +48,7 @@ def doctor(
     as_json: JsonOption = False,
     namespace: NamespaceOption = "",
     bus: BusOption = True,
+    stream: Annotated[bool, typer.Option("--stream", hidden=True)] = False,
 ) -> None:
     """Check a robot: its bus, its drives, and canbase itself if it runs. Report what is wrong and what to do next.
 
@@ -58,10 +60,14 @@ def doctor(
     checks could not be judged because this computer is overloaded.
     """
     loaded, arguments = load_config(config), ros_arguments(ctx, namespace)
-    checks = _walk(symptom, loaded, arguments, seconds) if symptom else _all(loaded, arguments, seconds, with_bus=bus)
+    checks = []
+    for check in _walk(symptom, loaded, arguments, seconds) if symptom else _all(loaded, arguments, seconds, bus):
+        checks.append(check)
+        if stream:  # for the page in the browser
+            print(json.dumps(_row(check)), flush=True)
     if as_json:
         typer.echo(json.dumps([_row(check) for check in checks]))
-    else:
+    elif not stream:
         _show(f"{_title(symptom)}, {loaded.robot.name}{f' at {namespace}' if namespace else ''}", checks)
     raise typer.Exit(exit_code(checks))
 
@@ -73,20 +79,22 @@ def _walk(symptom: str, loaded: Loaded, arguments: list[str], seconds: float) ->
     return walk(symptom, observe(loaded, arguments, seconds))
 
 
-def _all(loaded: Loaded, arguments: list[str], seconds: float, *, with_bus: bool) -> list[Check]:
+def _all(loaded: Loaded, arguments: list[str], seconds: float, with_bus: bool) -> Iterator[Check]:
     """Without any part of canbase on the bus, its parts are not looked for: the drives are there alone."""
     from canbase_cli.running import changes, running, running_checks
 
-    files = [*commissioning(loaded), *running_checks(loaded.robot, running(loaded.robot), changes(loaded))]
-    if not with_bus:
-        rows = _parts(loaded, arguments, seconds)
-        return [rows[0], *files, *rows[1:]]
-    from canbase_doctor.bus_checks import bus_checks
-    from canbase_doctor.bus_probe import look
+    yield good_file(loaded)
+    yield from commissioning(loaded)
+    yield from running_checks(loaded.robot, running(loaded.robot), changes(loaded))
+    if with_bus:
+        from canbase_doctor.bus_checks import bus_checks
+        from canbase_doctor.bus_probe import look
 
-    seen = look(loaded.robot)
-    rows = _parts(loaded, arguments, seconds) if seen.canbase_runs or seen.problem else [good_file(loaded)]
-    return [rows[0], *files, *bus_checks(seen), *rows[1:]]
+        seen = look(loaded.robot)
+        yield from bus_checks(seen)
+        if not (seen.canbase_runs or seen.problem):
+            return
+    yield from _parts(loaded, arguments, seconds)[1:]
 
 
 def _parts(loaded: Loaded, arguments: list[str], seconds: float) -> list[Check]:

@@ -29,6 +29,10 @@ def web(
         Path | None,
         typer.Option("--token-file", metavar="FILE", help="File with the token.", show_default="a new one each time"),
     ] = None,
+    proxy: Annotated[
+        str,
+        typer.Option("--proxy", metavar="URL", help="Address of a proxy with TLS before it: https://robot.example."),
+    ] = "",
     namespace: NamespaceOption = "",
 ) -> None:
     """Show a running robot in the browser: who drives, speeds, scan, drives, stops, the doctor. Needs no network.
@@ -50,7 +54,7 @@ def web(
         fail(f"canbase web needs the Python package {error.name}: pip install 'nicegui>=3.18,<4'", WRONG_INPUT)
     token = secrets.token_urlsafe(24) if token_file is None else _token(token_file)
     _need_one_address(host)
-    run(loaded, Address(host, port, token), arguments, namespace)
+    run(loaded, Address(host, port, token, _origin(proxy)), arguments, namespace)
 
 
 def _token(file: Path) -> str:
@@ -65,6 +69,19 @@ def _token(file: Path) -> str:
     if len(token) < SHORTEST_TOKEN or not token.isascii() or not token.isprintable() or " " in token:
         fail(f"{file}: a token has at least {SHORTEST_TOKEN} characters, and no space", WRONG_INPUT)
     return token
+
+
+def _origin(proxy: str) -> str:
+    """As a browser names it (RFC 6454). Exits with 2 for what is no address with TLS."""
+    import re
+
+    origin = proxy.lower().removesuffix("/").removesuffix(":443")
+    if proxy and not re.fullmatch(r"https://([a-z0-9.-]+|\[[0-9a-f:]+\])(:[0-9]{1,5})?", origin):
+        fail(
+            f"--proxy {proxy} is not https://NAME or https://NAME:PORT: a proxy gives the page a name of its own",
+            WRONG_INPUT,
+        )
+    return origin
 
 
 def _need_one_address(host: str) -> None:

@@ -93,20 +93,28 @@ def parsed(head: bytes) -> Request | None:
 @dataclass(frozen=True, slots=True)
 class Access:
     """`token`: of the address; `cookie`, `session`: the cookie's name and value; `hosts`: what a Host header may name,
-    with its port."""
+    with its port; `proxy`: of a proxy with TLS, https://NAME or https://NAME:PORT; empty: there is none."""
 
     token: str
     cookie: str
     session: str
     hosts: frozenset[str]
+    proxy: str = ""
+
+    @property
+    def _proxy_host(self) -> str:
+        return self.proxy.removeprefix("https://")
 
     def judge(self, request: Request) -> Verdict:
         """Of one request, HTTP or websocket."""
         headers = request.headers
-        if headers.get("host", "").lower() not in self.hosts:
+        host, origin = headers.get("host", "").lower(), headers.get("origin")
+        if not host or host not in {*self.hosts, self._proxy_host}:
             return Verdict.OTHER_HOST
-        origin = headers.get("origin")
-        if origin is not None and origin.lower() not in {f"http://{host}" for host in self.hosts}:
+        if origin is not None and origin.lower() not in {
+            self.proxy or None,
+            *(f"http://{each}" for each in self.hosts),
+        }:
             return Verdict.OTHER_SITE
         if not _short(headers.get("content-length", "0")):
             return Verdict.TOO_LONG
@@ -123,7 +131,10 @@ class Access:
         query.pop("token")
         rest = urlencode(query, doseq=True)
         place = "/" + request.path.lstrip("/") + (f"?{rest}" if rest else "")
-        return ("location", place), ("set-cookie", f"{self.cookie}={self.session}; Path=/; HttpOnly; SameSite=Strict")
+        is_local = request.headers.get("host", "").lower() in {*self.hosts, ""}
+        secure = "" if is_local else "; Secure"
+        cookie = f"{self.cookie}={self.session}; Path=/; HttpOnly; SameSite=Strict{secure}"
+        return ("location", place), ("set-cookie", cookie)
 
 
 def _same(given: str, expected: str) -> bool:

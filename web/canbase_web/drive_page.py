@@ -20,11 +20,15 @@ PAD: Final = (
     ("", "", ""), ("▼", "-1,0", "Backward"), ("", "", ""),
 )  # fmt: skip
 MISSING: Final = """\
-robot.yaml has no source for this page. Add one below the others, with a priority of its own, and start canbase again:
+robot.yaml has no source for this page. Given sources replace the defaults, so the whole section is this. \
+Then start canbase again.
 
 mux:
   sources:
-    web: {topic: cmd_vel_web, priority: 90, timeout_s: 0.3, nodes: [canbase_web]}"""
+    joystick:   {topic: cmd_vel_joy, priority: 100, timeout_s: 0.3}
+    web:        {topic: cmd_vel_web, priority: 90, timeout_s: 0.3, nodes: [canbase_web]}
+    navigation: {topic: cmd_vel_nav, priority: 50, timeout_s: 0.5}
+    action:     {topic: cmd_vel_action, priority: 40, timeout_s: 0.3, nodes: [drive_distance_server]}"""
 
 
 def add(pages: Pages) -> None:
@@ -41,8 +45,8 @@ def add(pages: Pages) -> None:
             with section("Hold to drive"):
                 if pages.source:
                     _pad()
-                    ui.label("Hold a button, or an arrow key. Release it: the robot stops.").classes("text-caption")
                     ui.html('<div id="hold-state" role="status">locked</div>', sanitize=False)
+                    ui.label("Hold a button, or an arrow key. Release it: the robot stops.").classes("text-caption")
                     greatest = f"{limits.linear_mps:g} m/s and {limits.angular_radps:g} rad/s"
                     ui.label(f"Share of the greatest speed ({greatest}):")
                     share = ui.slider(min=0.05, max=1.0, step=0.05, value=FIRST_SHARE).props(
@@ -58,11 +62,12 @@ def add(pages: Pages) -> None:
                     distance = ui.number("Distance [m]", value=0.5, step=0.1, format="%.2f")
                     speed = ui.number("Greatest speed [m/s]", value=min(0.2, limits.linear_mps), min=0.01,
                                       max=limits.linear_mps, step=0.05, format="%.2f")  # fmt: skip
+                    speed.style("min-width:12rem")
                     start = ui.button("Drive", on_click=lambda: _start(pages, distance, speed))
                     cancel = ui.button("Cancel", on_click=pages.link.goals.cancel).props("outline")
                 progress = ui.linear_progress(value=0.0, show_value=False).props('aria-label="Share of the distance"')
                 told = ui.label(pages.link.goals.text).props('role="status"')
-            with section("Reset a latched stop"):
+            with section("Reset a latched stop").props("id=reset"):
                 ui.label("The reset itself moves nothing. It is refused while anything orders a velocity.")
                 reset = ui.button("Reset").props("outline")
                 answer = ui.label("").props('role="status"')
@@ -96,7 +101,7 @@ def add(pages: Pages) -> None:
 
 def _pad() -> None:
     keys = "".join(
-        f'<button type="button" data-hold="{order}" aria-label="{name}" disabled>{sign}</button>'
+        f'<button type="button" data-hold="{order}" aria-label="{name}" tabindex="-1" disabled>{sign}</button>'
         if sign
         else "<span></span>"
         for sign, order, name in PAD
@@ -106,7 +111,7 @@ def _pad() -> None:
 
 def _start(pages: Pages, distance: ui.number, speed: ui.number) -> None:
     if not distance.value or not speed.value:
-        ui.notify("A distance and a speed are numbers other than 0.", type="warning")
+        ui.notify("A distance and a speed are numbers other than 0.", type="warning", position="top")
         return
     pages.drive(float(distance.value), float(speed.value))
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from canbase_web.hold import NUMBER_S, Hold
-from canbase_web.now_view import held_sentence
+from canbase_web.now_view import held_sentence, still_sentence
 from canbase_web.robot_link import RobotLink
 
 TICKET_S: Final = 10.0
@@ -101,14 +101,16 @@ class HoldSocket:
 
     async def _tell(self, now_s: float) -> None:
         number, holder = self._hold.number(now_s), self._hold.holder(now_s)
-        held = held_sentence(self._link.mux(now_s), self._source) if holder else ""
-        texts = {page: json.dumps({"number": number, "state": _state(page, holder, held)}) for page in self._pages}
+        state = still_sentence(self._link.newest("driver", now_s))
+        if not state:
+            state = held_sentence(self._link.newest("mux", now_s), self._source) if holder else "hold a key to drive"
+        texts = {page: json.dumps({"number": number, "state": _state(page, holder, state)}) for page in self._pages}
         sends = (asyncio.wait_for(self._pages[page].send_text(text), NUMBER_S) for page, text in texts.items())
         # A browser that hangs holds up no other; one that has gone is noticed by whoever reads from it.
         await asyncio.gather(*sends, return_exceptions=True)
 
 
-def _state(page: str, holder: str, held: str) -> str:
+def _state(page: str, holder: str, state: str) -> str:
     if holder == page:
-        return held
-    return "another page drives" if holder else "unlocked: hold a key to drive"
+        return state
+    return "another page drives" if holder else f"unlocked: {state}"

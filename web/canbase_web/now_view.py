@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
@@ -29,6 +28,8 @@ class Level(Enum):
     """How a part of the chain stands."""
 
     GOOD = "good"
+    IDLE = "idle"
+    """Nothing is wrong, and nothing is commanded."""
     WARN = "warn"
     BAD = "bad"
     """It stops the robot, or it is silent."""
@@ -69,11 +70,31 @@ def chain(robot: Robot) -> tuple[Part, ...]:
     )
 
 
-def headline(parts: Iterable[Part]) -> Part:
-    """The sentence that matters: of the part that stops, else of one that needs a look, else that all is well."""
-    parts = tuple(parts)
-    worst = [part for level in (Level.BAD, Level.WARN) for part in parts if part.level is level]
-    return worst[0] if worst else Part("robot", Level.GOOD, parts[0].text)
+def headline(robot: Robot) -> Part:
+    """The state of the robot: of its driver, of another part that stops it or needs a look, and who drives."""
+    source, *others = chain(robot)
+    driver = next(part for part in others if part.name == "motor_driver")
+    heard = others if robot.driver.fresh else others[:2]  # the driver reports of watchdog and drives
+    levels = (Level.BAD, Level.WARN) if driver.level is Level.GOOD else (Level.BAD,)
+    trouble = [part for level in levels for part in heard if part.level is level and part is not driver][:1]
+    told = [
+        _state(driver, robot.driver),
+        *(f"{part.name}: {part.text}" for part in trouble),
+        *([source.text] if robot.mux.fresh else []),
+    ]
+    level = max((part.level for part in (driver, *trouble, source)), key=list(Level).index)
+    return Part("robot", Level.GOOD if level is Level.IDLE else level, " · ".join(told))
+
+
+def waits_for_reset(robot: Robot) -> bool:
+    """Whether a reset is what ends the stop."""
+    return any(last.fresh and "reset" in last.message.clears_on for last in (robot.driver, robot.safety))
+
+
+def header_values(robot: Robot) -> dict[str, Any]:
+    """The state in the header of every page."""
+    state = headline(robot)
+    return {"level": state.level.value, "text": state.text, "waits_for_reset": waits_for_reset(robot)}
 
 
 def _silent(name: str, last: LastMessage) -> Part:
@@ -83,13 +104,23 @@ def _silent(name: str, last: LastMessage) -> Part:
 def _source(last: LastMessage) -> Part:
     name = "source"
     if not last.fresh:
-        return _silent(name, last)
+        return Part(name, Level.BAD, "unknown: reported by velocity_mux, which publishes nothing")
     active = next((source for source in last.message.sources if source.active), None)
     if active is None:
-        return Part(name, Level.WARN, "no active source")
+        return Part(name, Level.IDLE, "no active source")
     if source_standing(active.standing) is SourceStanding.FOLLOWED:
         return Part(name, Level.GOOD, f"{active.name} drives")
     return Part(name, Level.BAD, f"{active.name} is not followed: {active.reason}")
+
+
+def still_sentence(driver: LastMessage) -> str:
+    """Why no order moves the wheels, by motor_driver/status; empty: they follow."""
+    part = _driver(driver)
+    return "" if part.level is Level.GOOD else f"the robot does not move: {_state(part, driver)}"
+
+
+def _state(part: Part, driver: LastMessage) -> str:
+    return part.text if driver.fresh else f"{part.name}: {part.text}"
 
 
 def held_sentence(last: LastMessage, source: str) -> str:
@@ -136,7 +167,8 @@ def _driver(last: LastMessage) -> Part:
     state = driver_state(status.state)
     if state is DriverState.ENABLED:
         return Part(name, Level.GOOD, "enabled, at standstill" if status.standstill else "enabled, moves")
-    text = _with_end(f"{state.name.lower()}: {status.detail or status.cause}", status.clears_on)
+    cause = f"{status.cause} ({status.detail})" if status.detail else status.cause
+    text = _with_end(f"{state.word}: {cause}", status.clears_on)
     return Part(name, Level.BAD if state in (DriverState.LATCHED, DriverState.OFFLINE) else Level.WARN, text)
 
 
@@ -181,11 +213,8 @@ def _with_end(text: str, clears_on: str) -> str:
 
 def slow_values(robot: Robot) -> dict[str, Any]:
     """Chain, sources, drives and ages: what a person reads. Shown a few times a second."""
-    parts = chain(robot)
-    top = headline(parts)
     return {
-        "headline": {"level": top.level.value, "text": top.text if top.name == "robot" else f"{top.name}: {top.text}"},
-        "chain": [{"name": part.name, "level": part.level.value, "text": part.text} for part in parts],
+        "chain": [{"name": part.name, "level": part.level.value, "text": part.text} for part in chain(robot)],
         "sources": _source_rows(robot.mux),
         "drives": _drive_rows(robot.driver),
         "free": _clearances(robot.safety),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import html
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
@@ -15,6 +15,7 @@ from canbase_config.derive import watchdog_config
 from canbase_config.load import Loaded
 from canbase_watchdog.envelope import Bounds, Envelope
 from canbase_web.commissioning_dialog import ENDS_S, CommissioningDialog
+from canbase_web.feed import Feed
 from canbase_web.hold_socket import HoldSocket
 from canbase_web.now_view import Robot
 from canbase_web.presence import PERIOD_S, SEEN, Presence
@@ -27,29 +28,16 @@ MENU: Final = (
     ("/stops", "Stops"),
     ("/health", "Health"),
 )
-NEXT_THEME: Final = {None: True, True: False, False: None}
-"""By the one of now: as the computer has it, dark, light."""
+HEADER: Final = """
+<div class="top"><h1>{robot} · {title}</h1><nav aria-label="Pages">{links}</nav>
+<div id="state" role="status">…</div><a id="to-reset" href="/drive#reset" hidden>Reset</a>
+<button id="theme" type="button" aria-label="Light or dark" title="as the computer, dark, light">◐</button></div>"""
 STOP: Final = """
 <form class="stop-form" method="post" action="/stop">
+  <p id="stop-answer" role="alert"></p>
   <button type="submit" aria-label="Stop the robot: ramp, power off, latched until a reset">STOP</button>
 </form>"""
-STOP_SCRIPT: Final = """
-document.addEventListener("submit", async event => {
-  if (event.target.className !== "stop-form") return;
-  event.preventDefault();
-  const place = document.getElementById("stop-answer");
-  if (place) place.textContent = "Stop: no answer yet";
-  const patience = new AbortController(), timer = setTimeout(() => patience.abort(), 5000);  // both parts answer sooner
-  let said;
-  try {
-    const answer = await fetch("/stop", {method: "POST", signal: patience.signal});
-    said = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("p").textContent;
-  } catch (error) {
-    said = "The page does not reach canbase web: press the emergency stop at the robot.";
-  }
-  clearTimeout(timer);
-  if (place) place.textContent = said; else alert(said);
-});"""
+"""The first of the page, and none of NiceGUI's: it works without its script."""
 
 
 class Pages:
@@ -60,6 +48,7 @@ class Pages:
         self._envelope: Envelope | None = None
         self.commissioning = CommissioningDialog()
         """One run for all browsers."""
+        self.feed = Feed(self)
         self.watch = Presence()
         """Whether any browser shows any page: each has the stop."""
 
@@ -76,33 +65,24 @@ class Pages:
         return robot, now_s, self._envelope.advance(now_s)
 
     @contextmanager
-    def frame(self, path: str) -> Iterator[None]:
-        """Menu above, large stop below, the page's own content between."""
+    def frame(self, path: str) -> Iterator[dict[str, str]]:
+        """Robot, menu and state above, large stop below, the page's own content between. It may fill in the plots that
+        the feed gives numbers to."""
+        client, plots = ui.context.client, dict[str, str]()
         title = next(name for each, name in MENU if each == path)
         robot = self.loaded.robot.name + self.namespace
-        ui.add_head_html('<link rel="stylesheet" href="/static/page.css">')
+        ui.add_head_html('<link rel="stylesheet" href="/static/page.css"><script src="/static/page.js"></script>')
         ui.add_body_html(STOP)
-        ui.add_body_html(f"<script>{STOP_SCRIPT}</script>")
-        dark = ui.dark_mode(value=None)
-        with ui.header().classes("items-center q-py-xs"):
-            ui.label(f"canbase · {robot}").classes("text-subtitle1").props('role="heading" aria-level="1"')
-            with ui.element("nav").props('aria-label="Pages"').classes("row"):
-                for each, name in MENU:
-                    here = ' aria-current="page"' if each == path else ""
-                    ui.html(
-                        f'<a href="{each}"{here} style="color:inherit;padding:.5rem .7rem">{name}</a>', sanitize=False
-                    )
-            ui.space()
-            theme = ui.button(icon="contrast", on_click=lambda: dark.set_value(NEXT_THEME[dark.value]))
-            theme.props('flat color=white aria-label="Light or dark"')
+        here = {path: ' aria-current="page"'}
+        links = "".join(f'<a href="{each}"{here.get(each, "")}>{name}</a>' for each, name in MENU)
+        with ui.header():
+            header = HEADER.format(robot=html.escape(robot), title=title, links=links)
+            ui.html(header, sanitize=False).classes("w-full")
         ui.page_title(f"{title} · {robot}")
-        with ui.column().classes("w-full q-pa-sm q-gutter-sm"):
-            ui.html(
-                '<p id="stop-answer" role="alert" data-level="bad" style="margin:0;font-weight:600"></p>',
-                sanitize=False,
-            )
-            yield
-        client = ui.context.client
+        with ui.column().classes("w-full q-gutter-sm"):
+            yield plots
+        client.on_disconnect(lambda: self.feed.leave(client))
+        client.on_connect(lambda: self.feed.join(client, plots))
         ui.on("canbase_seen", lambda event: self.watch.on_number(event.args, time.monotonic()))
         ui.timer(PERIOD_S, lambda: self._prove(client))
 
@@ -148,14 +128,24 @@ def section(title: str) -> ui.card:
     """A card with a heading."""
     card = ui.card().classes("w-full")
     with card:
-        ui.label(title).classes("text-subtitle2").props('role="heading" aria-level="2"')
+        ui.html(f"<h2>{html.escape(title)}</h2>", sanitize=False)
     return card
 
 
-def table(name: str, columns: tuple[str, ...]) -> None:
-    """A table whose rows the page's script fills in."""
+def table(name: str, columns: tuple[str, ...], empty: str) -> None:
+    """A table whose rows the page's script fills in. `empty`: what will be there."""
     cells = "".join(f'<th scope="col">{html.escape(column)}</th>' for column in columns)
-    head = f"<thead><tr>{cells}</tr></thead>"
     ui.html(
-        f'<div class="scroll"><table class="values" id="{name}">{head}<tbody></tbody></table></div>', sanitize=False
-    ).classes("w-full")
+        f'<table class="values" id="{name}" hidden><thead><tr>{cells}</tr></thead><tbody></tbody></table>'
+        f'<p id="{name}-empty">{html.escape(empty)}</p>', sanitize=False,
+    ).classes("w-full")  # fmt: skip
+
+
+def legend(lines: Iterable[tuple[str, str, bool]]) -> str:
+    """What the lines of a plot are: name, colour, and whether it is dashed. Beside the plot, where it has room."""
+    items = (
+        f'<li><i style="border-color:{colour};border-top-style:{"dashed" if dashed else "solid"}"></i>'
+        f"{html.escape(name)}</li>"
+        for name, colour, dashed in lines
+    )
+    return f'<ul class="legend">{"".join(items)}</ul>'

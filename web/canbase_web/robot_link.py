@@ -89,10 +89,10 @@ class RobotLink:
             self._look(name, received_s)
         return Robot(**{name: self._last(name, now_s) for name in self._kept})
 
-    def mux(self, now_s: float) -> LastMessage:
-        """velocity_mux/state alone."""
-        self._look("mux", self._receive_times.at(now_s))
-        return self._last("mux", now_s)
+    def newest(self, name: str, now_s: float) -> LastMessage:
+        """Of one topic alone."""
+        self._look(name, self._receive_times.at(now_s))
+        return self._last(name, now_s)
 
     def _look(self, name: str, received_s: float) -> None:
         if (message := self._reader.take(self._topics[name])) is not None:
@@ -165,7 +165,7 @@ class Goals:
         self._client = DriveClient(self._node)
         self._thread: threading.Thread | None = None
         self._canceled = threading.Event()
-        self.text = "no goal yet"
+        self.text = "no goal yet: its progress and its result will be here"
         self.share = 0.0
         """Of the distance that was driven."""
 

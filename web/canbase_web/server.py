@@ -48,11 +48,13 @@ class Address:
     host: str
     port: int
     token: str
+    proxy: str = ""
+    """Of a proxy with TLS before it: https://NAME or https://NAME:PORT."""
 
     @property
     def url(self) -> str:
         """For the person; it has the token."""
-        return f"http://{authority(self.host, self.port)}/?token={self.token}"
+        return f"{self.proxy or f'http://{authority(self.host, self.port)}'}/?token={self.token}"
 
 
 def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -> None:
@@ -63,6 +65,7 @@ def run(loaded: Loaded, address: Address, ros_args: list[str], namespace: str) -
         COOKIE.format(port=address.port),
         secrets.token_urlsafe(32),
         hosts(address.host, address.port),
+        address.proxy,
     )
     try:
         listener = Listener((address.host, address.port), access)

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canbase_cli.main import app
+from canbase_cli.web import _origin
 
 
 def refused(*words: str) -> tuple[int, str]:
@@ -21,6 +22,17 @@ def refused(*words: str) -> tuple[int, str]:
 def test_an_address_that_no_browser_can_open_is_refused(host: str) -> None:
     code, said = refused("--host", host)
     assert (code, "give that of one interface" in said) == (2, True)
+
+
+@pytest.mark.parametrize("url", ["http://robot.example", "robot.example", "https://", "https://robot.example/canbase"])
+def test_a_proxy_without_tls_or_with_a_path_is_refused(url: str) -> None:
+    code, said = refused("--proxy", url)
+    assert (code, "is not https://NAME" in said) == (2, True)
+
+
+@pytest.mark.parametrize("url", ["https://Robot.example", "https://robot.example:443/"])
+def test_a_proxy_has_the_name_that_a_browser_gives_it(url: str) -> None:
+    assert _origin(url) == "https://robot.example"
 
 
 @pytest.mark.parametrize(

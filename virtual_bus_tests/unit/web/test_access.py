@@ -49,6 +49,31 @@ def test_a_name_that_was_bound_to_this_address_by_someone_else_is_refused_with_a
     assert judged(MINE | {"host": host}, f"token={TOKEN}") is Verdict.OTHER_HOST
 
 
+PROXIED = Access(TOKEN, NAME, SESSION, hosts("127.0.0.1", 8080), "https://robot.example")
+
+
+@pytest.mark.parametrize("host", ["robot.example", "127.0.0.1:8080"])
+def test_behind_a_proxy_with_tls_its_name_and_its_pages_pass_and_no_other(host: str) -> None:
+    """Some proxies pass on the name that the browser has asked for, some give that of the server behind them."""
+    theirs = MINE | {"host": host, "origin": "https://robot.example"}
+    assert judged(theirs, access=PROXIED) is Verdict.PASSES
+    assert judged(MINE | {"origin": "http://127.0.0.1:8080"}, access=PROXIED) is Verdict.PASSES
+    assert judged(theirs) in (Verdict.OTHER_HOST, Verdict.OTHER_SITE), "without --proxy"
+    for origin in ("http://robot.example", "https://robot.example:8443", "https://evil.example", "null", ""):
+        assert judged(theirs | {"origin": origin}, access=PROXIED) is Verdict.OTHER_SITE
+
+
+def test_no_host_and_no_origin_are_those_of_a_proxy_that_is_not_there() -> None:
+    assert judged(MINE | {"host": ""}) is Verdict.OTHER_HOST
+    assert judged(MINE | {"origin": ""}) is Verdict.OTHER_SITE
+
+
+@pytest.mark.parametrize(("host", "secure"), [("robot.example", True), ("127.0.0.1:8080", False)])
+def test_the_cookie_of_a_proxy_with_tls_goes_over_tls_alone(host: str, secure: bool) -> None:
+    _, (_, cookie) = PROXIED.login(Request("GET", "/", f"token={TOKEN}", {"host": host}))
+    assert cookie.endswith("; Secure") is secure
+
+
 def test_the_pages_of_two_robots_in_one_browser_have_cookies_of_their_own() -> None:
     """127.0.0.1:8080 and 127.0.0.1:8081 are one host to a browser: a login at one must not end that at the other."""
     other = Access(TOKEN, COOKIE.format(port=8081), "session-of-another", hosts("127.0.0.1", 8081))

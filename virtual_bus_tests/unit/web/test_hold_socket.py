@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from canbase.msg import DriverStatus
 from starlette.websockets import WebSocketDisconnect
 
 from canbase_runtime.last_message import LastMessage
@@ -57,10 +58,11 @@ class Robot:
 
     def __init__(self) -> None:
         self.orders: list[Speed] = []
+        self.driver = DriverStatus(state=DriverStatus.ENABLED)
         self.source = SimpleNamespace(name="web", active=True, standing=SourceStanding.FOLLOWED, reason="")
 
-    def mux(self, now_s: float) -> LastMessage:
-        return LastMessage(SimpleNamespace(sources=[self.source]), 0.0)
+    def newest(self, name: str, now_s: float) -> LastMessage:
+        return LastMessage({"mux": SimpleNamespace(sources=[self.source]), "driver": self.driver}[name], 0.0)
 
     def order(self, speed: Speed) -> None:
         self.orders.append(speed)
@@ -242,3 +244,22 @@ def test_a_page_whose_orders_the_mux_does_not_follow_is_told_why_and_not_that_it
         return said
 
     assert asyncio.run(tell()) == ["not followed: waiting for zero (restarted)", "drives"]
+
+
+def test_an_unlocked_page_of_a_latched_robot_offers_no_key_and_one_that_holds_does_not_say_that_it_drives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def tell() -> list[str]:
+        story = Story(monkeypatch)
+        socket, _ = await story.page(story.socket.ticket())
+        said = [socket.sent[-1]["state"]]
+        story.robot.driver = DriverStatus(state=DriverStatus.LATCHED, cause="stop requested", clears_on="reset")
+        await story.turn()
+        said.append(socket.sent[-1]["state"])
+        socket.hold()
+        await story.turn()
+        await story.turn()
+        return [*said, socket.sent[-1]["state"]]
+
+    why = "the robot does not move: latched: stop requested; ends with: reset"
+    assert asyncio.run(tell()) == ["unlocked: hold a key to drive", f"unlocked: {why}", why]

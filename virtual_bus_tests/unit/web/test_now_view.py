@@ -8,7 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from canbase.msg import DriverStatus, DriveStatus, ForeignPublisher, MuxLock, MuxSource, MuxState, SafetyState
+from canbase.msg import (
+    DriverStatus,
+    DriveStatus,
+    ForeignPublisher,
+    MuxLock,
+    MuxSource,
+    MuxState,
+    SafetyState,
+    StopEvent,
+)
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState, LaserScan
@@ -16,7 +25,19 @@ from sensor_msgs.msg import JointState, LaserScan
 from canbase_config.load import load_robot, sample
 from canbase_runtime.last_message import NOT_RECEIVED, SILENT_S, LastMessage
 from canbase_web.floor_view import MOST_POINTS, outlines, points
-from canbase_web.now_view import Level, Robot, chain, fast_values, headline, held_sentence, slow_values
+from canbase_web.now_page import _rounded_up
+from canbase_web.now_view import (
+    Level,
+    Robot,
+    chain,
+    fast_values,
+    header_values,
+    headline,
+    held_sentence,
+    slow_values,
+    still_sentence,
+)
+from canbase_web.stops_page import rows_of
 
 NAN = math.nan
 
@@ -78,8 +99,11 @@ WELL = Robot(
 
 def test_a_robot_that_drives_is_green_and_says_who_drives() -> None:
     assert {part.level for part in chain(WELL)} == {Level.GOOD}
-    top = headline(chain(WELL))
-    assert (top.level, top.text) == (Level.GOOD, "joystick drives")
+    assert header_values(WELL) == {
+        "level": "good",
+        "text": "enabled, moves · joystick drives",
+        "waits_for_reset": False,
+    }
 
 
 def mux(**changes: object) -> LastMessage:
@@ -91,7 +115,7 @@ PAUSE = MuxLock(name="pause", holds=True, standing=MuxLock.LOCKED, reason="holds
 STRANGER = ForeignPublisher(node="/x", topic="cmd_vel", problem="not named")
 BLOCKED = safety(action=SafetyState.STOP, cause="obstacle", detail="0.12 m ahead", clears_on="free way")
 NEAR = safety(action=SafetyState.SLOW, cause="obstacle_near", detail="0.4 m ahead")
-LATCHED = driver(state=DriverStatus.LATCHED, cause="stop requested", clears_on="reset")
+LATCHED = driver(state=DriverStatus.LATCHED, cause="stop requested", detail="by whom", clears_on="reset")
 BOOTS = driver(state=DriverStatus.BOOTING, cause="booting")
 TRIPPED = driver(watchdog="tripped", watchdog_cause="lease lost", watchdog_rung=1)
 
@@ -99,14 +123,14 @@ TRIPPED = driver(watchdog="tripped", watchdog_cause="lease lost", watchdog_rung=
 @pytest.mark.parametrize(
     ("changes", "part", "level", "text"),
     [
-        ({"mux": mux(sources=[])}, "source", Level.WARN, "no active source"),
+        ({"mux": mux(sources=[])}, "source", Level.IDLE, "no active source"),
         ({"mux": mux(sources=[UNARMED])}, "source", Level.BAD, "joystick is not followed: waiting for zero"),
         ({"mux": mux(locks=[PAUSE])}, "velocity_mux", Level.BAD, "lock pause: "),
         ({"mux": mux(foreign=[STRANGER])}, "velocity_mux", Level.BAD, "/x publishes on cmd_vel: not named"),
         ({"mux": mux(ready=False, not_ready="drives off")}, "velocity_mux", Level.WARN, "drives off"),
         ({"safety": BLOCKED}, "safety_filter", Level.BAD, "stops: 0.12 m ahead; ends with: free way"),
         ({"safety": NEAR}, "safety_filter", Level.WARN, "slows: 0.4 m ahead"),
-        ({"driver": LATCHED}, "motor_driver", Level.BAD, "latched: stop requested; ends with: reset"),
+        ({"driver": LATCHED}, "motor_driver", Level.BAD, "latched: stop requested (by whom); ends with: reset"),
         ({"driver": BOOTS}, "motor_driver", Level.WARN, "booting: booting"),
         ({"driver": TRIPPED}, "watchdog", Level.BAD, "tripped: lease lost; its ladder: quick stop"),
         ({"driver": driver(watchdog="tripped", watchdog_rung=99)}, "watchdog", Level.BAD, "its ladder: unknown (99)"),
@@ -130,12 +154,55 @@ def test_the_part_that_stops_is_red_and_says_why(
     (found,) = (each for each in chain(robot) if each.name == part)
     assert found.level is level
     assert text in found.text
-    assert headline(chain(robot)).name == part
+    top = headline(robot)
+    assert text in top.text
+    assert top.level is (Level.GOOD if level is Level.IDLE else level)
 
 
-def test_what_stops_the_robot_is_the_headline_before_what_needs_a_look() -> None:
-    robot = replace(WELL, mux=mux(sources=[]), driver=LastMessage(LATCHED, 0.1))
-    assert headline(chain(robot)).name == "motor_driver"
+def test_the_header_has_the_latched_stop_its_cause_and_its_reset_and_what_needs_a_look_is_not_in_the_way() -> None:
+    latched = driver(
+        state=DriverStatus.LATCHED, cause="stop requested", clears_on="reset", drives=[drive(health="85 °C")]
+    )
+    robot = replace(WELL, mux=mux(sources=[]), driver=LastMessage(latched, 0.1))
+    assert header_values(robot) == {
+        "level": "bad",
+        "text": "latched: stop requested; ends with: reset · no active source",
+        "waits_for_reset": True,
+    }
+    assert not header_values(replace(robot, driver=LastMessage(latched, 3.0)))["waits_for_reset"]
+    assert header_values(replace(WELL, safety=LastMessage(safety(clears_on="reset"), 0.1)))["waits_for_reset"]
+
+
+STOPS = (
+    StopEvent(cause="estop", latched=True),
+    StopEvent(cause="stop requested", latched=True, black_box="/x/stop.asc"),
+    StopEvent(cause="obstacle", standstill=True, standstill_s=0.4, distance_m=0.1),
+)
+
+
+@pytest.mark.parametrize(
+    ("robot", "newest"),
+    [
+        (WELL, "done"),
+        (replace(WELL, driver=LastMessage(LATCHED, 0.1)), "needed"),
+        (replace(WELL, driver=LastMessage(LATCHED, 9.0)), "needed"),
+        (replace(WELL, safety=LastMessage(safety(estop=True, clears_on="release"), 0.1)), "needed"),
+    ],
+)
+def test_a_reset_is_needed_for_the_newest_latched_stop_until_it_is_done(robot: Robot, newest: str) -> None:
+    rows = rows_of(STOPS, robot)
+    assert [(row["cause"], row["reset"]) for row in rows] == [
+        ("obstacle", ""), ("stop requested", newest), ("estop", "done"),
+    ]  # fmt: skip
+    assert (rows[0]["time"], rows[0]["way"], rows[1]["file"]) == ("0.40 s", "0.100 m", "stop.asc")
+
+
+@pytest.mark.parametrize("value", [0.8, 2.0, 0.5 / 0.075, 0.85, 13.37, 99.0])
+def test_the_ends_of_an_axis_have_two_digits_and_its_quarters_few_more(value: float) -> None:
+    """Six digits of a label do not fit beside a plot on a phone."""
+    most = _rounded_up(value)
+    assert value <= most <= 1.2 * value
+    assert max(len(f"{most:g}"), len(f"{most / 2:g}")) <= 4
 
 
 @pytest.mark.parametrize("name", ["mux", "safety", "driver"])
@@ -143,8 +210,8 @@ def test_what_stops_the_robot_is_the_headline_before_what_needs_a_look() -> None
 def test_a_part_that_is_silent_is_red_and_its_last_state_is_not_shown(name: str, age_s: float, fresh: bool) -> None:
     last = replace(getattr(WELL, name), age_s=age_s)
     robot = replace(WELL, **{name: last})
-    assert (headline(chain(robot)).level is Level.GOOD) is fresh
-    shown = json.dumps(slow_values(robot))
+    assert (headline(robot).level is Level.GOOD) is fresh
+    shown = json.dumps([slow_values(robot), header_values(robot)])
     if name == "driver":
         assert ("operation enabled" in shown) is fresh
     if not fresh:
@@ -153,7 +220,7 @@ def test_a_part_that_is_silent_is_red_and_its_last_state_is_not_shown(name: str,
 
 def test_a_part_that_never_spoke_says_so() -> None:
     assert [part.level for part in chain(Robot())] == [Level.BAD] * 6
-    assert headline(chain(Robot())).text == "no message yet"
+    assert headline(Robot()).text == "motor_driver: no message yet · velocity_mux: no message yet"
 
 
 def test_values_that_a_drive_does_not_measure_are_dashes_and_the_whole_is_json() -> None:
@@ -245,6 +312,13 @@ HELD = (
     (replace(of(source(name="web")), age_s=3.0), "not followed: velocity_mux: no message for 3 s"),
     (NOT_RECEIVED, "not followed: velocity_mux: no message yet"),
 )
+
+
+def test_a_robot_that_follows_nothing_says_why() -> None:
+    assert still_sentence(WELL.driver) == ""
+    latched = "latched: stop requested (by whom); ends with: reset"
+    assert still_sentence(LastMessage(LATCHED, 0.1)) == f"the robot does not move: {latched}"
+    assert still_sentence(LastMessage(LATCHED, 9.0)) == "the robot does not move: motor_driver: no message for 9 s"
 
 
 @pytest.mark.parametrize(("last", "sentence"), HELD)

@@ -26,7 +26,7 @@ window.canbaseHold = (() => {
   const lock = () => { release(); if (socket) { socket.onclose = null; socket.close(); } socket = null; newest = 0; say("locked"); };
   const unlock = ticket => {
     lock();
-    socket = new WebSocket(`ws://${location.host}/hold?ticket=${ticket}`);
+    socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/hold?ticket=${ticket}`);
     socket.onmessage = event => {
       const message = JSON.parse(event.data);
       newest = message.number;

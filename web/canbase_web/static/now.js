@@ -1,13 +1,7 @@
 // The page `Now`: the server sends numbers 20 times a second and words 5 times; what the plots keep stays in the browser.
 window.canbaseNow = (() => {
   const KEEP_S = 20, series = {};
-  const text = (id, value) => { const e = document.getElementById(id); if (e && e.textContent !== value) e.textContent = value; };
-  const row = cells => { const tr = document.createElement("tr"); cells.forEach(c => { const td = document.createElement("td"); td.textContent = c; tr.append(td); }); return tr; };
-  const table = (id, rows) => {
-    const body = document.querySelector(`#${id} tbody`);
-    const now = JSON.stringify(rows);
-    if (body && body.dataset.now !== now) { body.dataset.now = now; body.replaceChildren(...rows.map(row)); }
-  };
+  const {table, text} = window.canbasePage;
   const plot = (element, name, t, values) => {
     const view = typeof getElement === "function" && getElement(element);
     if (!view || !view.chart) return;
@@ -20,14 +14,12 @@ window.canbaseNow = (() => {
     if (kept.length) view.$el.dataset.points = kept[0].length;
   };
   const words = data => {
-    const top = document.getElementById("headline");
-    if (top) { top.dataset.level = data.headline.level; text("headline", data.headline.text); }
     data.chain.forEach((part, i) => {
       const box = document.getElementById(`part-${i}`);
       if (!box) return;
       box.dataset.level = part.level;
       text(`part-${i}-text`, part.text);
-      text(`part-${i}-mark`, {good: "✓", warn: "!", bad: "✕"}[part.level]);
+      text(`part-${i}-mark`, {good: "✓", idle: "–", warn: "!", bad: "✕"}[part.level]);
     });
     table("sources", data.sources);
     table("drives", data.drives);
@@ -38,6 +30,7 @@ window.canbaseNow = (() => {
     const group = document.getElementById("scan");
     if (!group) return;
     group.setAttribute("d", points.map(([x, y]) => `M${(-y).toFixed(2)} ${(-x).toFixed(2)}h0`).join(""));
+    document.getElementById("no-scan").hidden = true;
   };
   const update = (plots, data) => {
     if (data.words) words(data.words);
