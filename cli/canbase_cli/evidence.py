@@ -115,7 +115,7 @@ def _gather(config: Path | None, sources: Sources, out: Path | None) -> None:
 
 
 def _tell(found: Evidence, out: Path) -> None:
-    from canbase_evidence.check_folder import list_sha256
+    from canbase_evidence.hash_list import list_sha256
 
     for each in found.open:
         typer.echo(f"{each.standing.value}: {each.part.value}: {each.sentence}")
@@ -128,8 +128,7 @@ def _tell(found: Evidence, out: Path) -> None:
 
 
 def _check(folder: Path) -> None:
-    from canbase_evidence.check_folder import check, list_sha256
-    from canbase_evidence.hash_list import NAME, HashListError
+    from canbase_evidence.hash_list import NAME, HashListError, check, list_sha256
 
     try:
         differences, digest = check(folder), list_sha256(folder)

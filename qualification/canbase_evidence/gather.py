@@ -18,9 +18,9 @@ from canbase_config.load import Loaded
 from canbase_doctor.careful_read import names
 from canbase_evidence import commissioning_proof, drive_identities, hash_list, hazard_results, qualification_report
 from canbase_evidence import recorded_stops as recorded
-from canbase_evidence.check_folder import hashes
 from canbase_evidence.evidence import BOM, Evidence, as_json
 from canbase_evidence.evidence_page import page
+from canbase_evidence.hash_list import hashes
 from canbase_evidence.installed_code import code_sha256
 from canbase_evidence.junit_results import Case, JUnitError, read_cases
 from canbase_evidence.new_folder import Folder, GatherError, taken

@@ -19,7 +19,7 @@ from canbase_config.commissioned import STEPS, mark
 from canbase_config.fingerprint import configuration_sha256
 from canbase_config.load import load_robot
 from canbase_driver.runtime.black_box_about import about
-from canbase_evidence import check_folder, hash_list
+from canbase_evidence import hash_list
 from canbase_evidence.hash_list import Difference, HashListError
 from canbase_evidence.software import Software
 from canbase_evidence.standing import Finding, Part, Standing
@@ -182,7 +182,7 @@ def test_the_same_input_gives_the_same_bytes_except_the_stated_time(
     run(*words, tmp_path / "two")
     monkeypatch.setenv("SOURCE_DATE_EPOCH", str(int(NOON) + 3600))
     run(*words, tmp_path / "later")
-    one, two, later = (check_folder.hashes(tmp_path / name) for name in ("one", "two", "later"))
+    one, two, later = (hash_list.hashes(tmp_path / name) for name in ("one", "two", "later"))
     assert one == two
     assert {name for name in one if one[name] != later[name]} == {"index.html", "evidence.json", "SHA256SUMS"}
     texts = [(tmp_path / name / "index.html").read_text() for name in ("one", "later")]
@@ -307,7 +307,7 @@ def test_a_link_or_a_pipe_in_place_of_a_file_is_a_change_and_is_not_followed(fol
     data.unlink()
     os.mkfifo(data)
     (folder / "more").symlink_to(tmp_path)
-    assert check_folder.check(folder) == (
+    assert hash_list.check(folder) == (
         Difference("evidence.json", "changed"), Difference("index.html", "changed"), Difference("more", "added"),
     )  # fmt: skip
 
@@ -339,10 +339,10 @@ def test_a_folder_without_a_list(tmp_path: Path) -> None:
 
 
 def test_nothing_is_overwritten(folder: Path, robot_yaml: Path) -> None:
-    before = check_folder.hashes(folder)
+    before = hash_list.hashes(folder)
     code, _, told = run(robot_yaml, "--out", folder)
     assert (code, "never overwritten" in told) == (2, True)
-    assert check_folder.hashes(folder) == before
+    assert hash_list.hashes(folder) == before
 
 
 @pytest.mark.parametrize(
