@@ -25,7 +25,6 @@ class Report:
     hazards: tuple[HazardFigures, ...]
     unlisted: tuple[tuple[str, StopFigures | None], ...]
     """Failures that some run had and no row of the catalogue names."""
-    all_stops: StopFigures | None
     ordinary_stops: StopFigures | None
     distances: tuple[StoppingDistance, ...]
     own_stops: tuple[OwnStop, ...]
@@ -50,7 +49,6 @@ def report(setup: Setup, collected: Collected) -> Report:
         verdict,
         tuple(collected.row(row, setup.robot) for row in collected.catalogue.rows),
         tuple((name, collected.figures([name])) for name in collected.unlisted),
-        stops,
         collected.figures([""]),
         tuple(stopping_distances(collected, setup.robot)),
         own_stops(setup.robot),

@@ -15,7 +15,6 @@ _ASC_HEADER: Final = re.compile(
 )
 _ASC_NOTE: Final = re.compile(r"(?:(\d+\.\d+)\s+)?//\s?(?:(\d+\.\d+) )?(.*)", re.DOTALL)
 """python-can writes an event's time before the slashes, canbase a note's behind them."""
-_BASE: Final = re.compile(r"base\s+(?:hex|dec).*", re.IGNORECASE)
 RESUMED: Final = ("internal events logged\n",)
 """What a new ASC reader needs before it takes the next line as a frame."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import bisect
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -163,11 +163,6 @@ def first_after(times: Sequence[float], at_s: float) -> float:
     """The first time after; infinity: none."""
     at = bisect.bisect_right(times, at_s)
     return times[at] if at < len(times) else math.inf
-
-
-def first_where(line: Line[T], since_s: float, until_s: float, holds: Callable[[T], bool]) -> float | None:
-    """When a value first fulfils a condition; None: never."""
-    return next((at_s for at_s, value in between(line, since_s, until_s) if holds(value)), None)
 
 
 def units_of(robot: Robot | None) -> dict[tuple[int, int], tuple[str, AxisUnits]]:
