@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from canbase_cli.options import NamespaceOption
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, CommandError, colour, fail, load_config
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded
@@ -137,7 +137,7 @@ def _installed(path: Path) -> Loaded:
 
     try:
         return load_config(path)
-    except typer.Exit:
+    except CommandError:
         if path.is_file():
             advice = f"Write into a copy of {path} what is missing, then: sudo canbase setup install --config COPY."
             typer.echo(f"{UNCHANGED} {advice}", err=True)

@@ -7,7 +7,8 @@ from difflib import get_close_matches
 from typing import Any, Final
 
 import typer
-from typer.core import TyperGroup
+
+from canbase_cli.options import Commands
 
 GROUPS: Final = {
     "setup": ("init", "commission", "calibrate", "install", "uninstall"),
@@ -33,7 +34,7 @@ def renamed(words: list[str]) -> list[str] | None:
     return [*NEW[words[0]], *words[1:]] if words[0] in NEW else None
 
 
-class OldNames(TyperGroup):
+class OldNames(Commands):
     """The commands of canbase, by their old names too."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

@@ -27,6 +27,15 @@ _CONTROLS: Final = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\
 """All of Unicode's category Cc but line feed and tab, line and paragraph separators, and what turns the direction."""
 
 
+class CommandError(Exception):
+    """A command ends here: a last line for stderr, none where all is printed, and its exit code. The command line
+    (`canbase_cli.options`) is the one place that prints and exits."""
+
+    def __init__(self, text: str, code: int) -> None:
+        super().__init__(text)
+        self.code = code
+
+
 class Screen(io.TextIOWrapper):
     """What a command prints. Names from DDS, files and CAN control no terminal, whichever command prints them: control
     characters become \\u001b (so in JSON too), except those of `passes`, a regular expression."""
@@ -94,10 +103,14 @@ def warn(text: str) -> None:
     typer.secho(f"warning: {text}", err=True, fg=typer.colors.YELLOW, color=colour())
 
 
+def agreed(question: str) -> bool:
+    """Whether the person at the terminal says yes."""
+    return typer.confirm(question, default=False, err=True)
+
+
 def fail(text: str, code: int) -> NoReturn:
     """Ends the command with a last line on stderr and the exit code `code`."""
-    typer.secho(f"canbase: {text}", err=True, fg=typer.colors.RED, color=colour())
-    raise typer.Exit(code)
+    raise CommandError(text, code)
 
 
 def colour() -> bool | None:

@@ -7,15 +7,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import typer
-
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
 from canbase_commissioning.session import Session
 from canbase_config.robot import Bus
 from canbase_runtime.single_instance import TakenError, bus_name, take
-from canbase_runtime.terminal import FAILED, fail
+from canbase_runtime.terminal import FAILED, agreed, fail
 
 
 @contextmanager
@@ -45,4 +43,4 @@ def confirmed(question: str, *, yes: bool, option: str = "--yes") -> bool:
         return True
     if not sys.stdin.isatty():
         fail(f"{question} Nobody is here to answer: add {option}", FAILED)
-    return typer.confirm(question, default=False, err=True)
+    return agreed(question)

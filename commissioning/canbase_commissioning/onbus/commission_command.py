@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import typer
 from pydantic import ValidationError
 
 from canbase_commissioning.calibration import CalibrationError
@@ -34,7 +33,7 @@ from canbase_commissioning.wheel_direction import AGAIN, WheelFound, find_direct
 from canbase_config.errors import ConfigError
 from canbase_config.robot import Robot
 from canbase_config.units import mps_per_bit
-from canbase_runtime.terminal import FAILED, fail, load_config
+from canbase_runtime.terminal import FAILED, CommandError, fail, load_config
 from canbase_runtime.version import installed_version
 
 WHEELS_UP = (
@@ -81,7 +80,7 @@ def run(given: Path | None, plan: Plan, answers: Path | None, *, yes: bool, dry_
     if results.ended_by:
         fail(results.ended_by, FAILED)
     if "proof" in plan.steps and not results.proven:
-        raise typer.Exit(FAILED)
+        raise CommandError("", FAILED)
 
 
 def _go(line: BusSession, robot: Robot, plan: Plan, person: Person, results: Results) -> None:
@@ -194,7 +193,7 @@ def _write_report(robot: Robot, wanted: Path | None, config: Path, results: Resu
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except OSError as error:
-        typer.echo(text)
+        print(text)
         fail(f"the report above cannot be written: {error}", FAILED)
     return f"report: {path}"
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import typer
-
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.error_history import clear_history, read_history
 from canbase_commissioning.onbus.alone import alone, confirmed, run_alone
@@ -15,7 +13,7 @@ from canbase_commissioning.onbus.params_source import result_of, sdo_session
 from canbase_commissioning.parameters.reading import read_identity
 from canbase_config.profile_file import guess, load_profile
 from canbase_config.robot import Bus, Robot
-from canbase_runtime.terminal import FAILED, fail
+from canbase_runtime.terminal import FAILED, CommandError, fail
 
 
 def run_emcy(bus: Bus, robot: Robot | None, node: int, timeout_s: float) -> None:
@@ -27,9 +25,9 @@ def run_emcy(bus: Bus, robot: Robot | None, node: int, timeout_s: float) -> None
         line.run(session)
         history = result_of(session.tasks[node], line)
     for text in history.lines(makers):
-        typer.echo(f"node {node}: {text}")
+        print(f"node {node}: {text}")
     if history.entries is None:
-        raise typer.Exit(FAILED)
+        raise CommandError("", FAILED)
 
 
 def _makers(line: BusSession, heard: Listener, robot: Robot | None, node: int, timeout_s: float) -> Mapping[int, str]:
@@ -55,4 +53,4 @@ def run_clear(bus: Bus, node: int, timeout_s: float, *, yes: bool) -> None:
         refused = result_of(session.tasks[node], line)
     if refused:
         fail(f"node {node}: the history is not cleared: {refused}", FAILED)
-    typer.echo(f"node {node}: the history is empty")
+    print(f"node {node}: the history is empty")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-
-import typer
 
 from canbase_commissioning.bus_monitor import OURS, Listener
 from canbase_commissioning.drive_survey import FoundAxis, profile_of, survey
@@ -129,7 +128,7 @@ def _write(output: Path, text: str, person: Person) -> None:
     try:
         loaded = load_robot(draft)
     except ConfigError as error:
-        typer.echo(str(error), err=True)
+        print(str(error), file=sys.stderr)
         fail(f"these values do not fit together; they are in {draft}: correct them there, and rename it", FAILED)
     _write_first(output, text)
     draft.unlink()

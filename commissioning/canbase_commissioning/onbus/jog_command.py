@@ -13,8 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-import typer
-
 from canbase_commissioning.guide import CommissionError, Guide, Script
 from canbase_commissioning.jog_session import JogSession
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
@@ -24,7 +22,7 @@ from canbase_commissioning.powered_drives import PoweredDrives, RigError
 from canbase_commissioning.safe_stop import SafeStop
 from canbase_commissioning.self_stop_test import get_ready
 from canbase_config.robot import Robot
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail, load_config, with_cursor
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, agreed, fail, load_config, warn, with_cursor
 
 SHOW_S: Final = 0.2
 CANNOT_STOP: Final = (
@@ -42,7 +40,7 @@ def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None
         fail(f"there is no wheel {joint!r} in robot.yaml, expected one of {', '.join(joints)}", WRONG_INPUT)
     if not sys.stdin.isatty():
         fail("jog needs an interactive terminal", WRONG_INPUT)
-    if not yes and not typer.confirm(
+    if not yes and not agreed(
         f"{robot.name}, {robot.bus.channel}: WHEELS UP, nothing near them, the emergency stop (STO) at hand and tried?"
     ):
         fail("not confirmed", FAILED)
@@ -53,14 +51,13 @@ def run(config: Path | None, joint: str, speed_mps: float, *, yes: bool) -> None
         except (RigError, CommissionError, OSError) as error:
             fail(f"{error}. The wheel was stopped, its power is off", FAILED)
         except Stopped as stopped:
-            typer.secho(f"canbase: {stopped}: the wheel was stopped, its power is off", err=True, color=colour())
-            raise typer.Exit(128 + stopped.number) from stopped
+            fail(f"{stopped}: the wheel was stopped, its power is off", 128 + stopped.number)
 
 
 def _jog(line: BusSession, robot: Robot, joint: str, speed_mps: float) -> None:
     rig = PoweredDrives(robot)
     try:
-        line.run(Guide(rig, _boot(rig), lambda told: typer.echo(told.text)))
+        line.run(Guide(rig, _boot(rig), lambda told: print(told.text)))
         _say_what_happens_after_a_kill(rig, joint)
         session = JogSession(rig, joint, speed_mps)
         with _single_keys():
@@ -95,10 +92,10 @@ def _hold(line: BusSession, session: JogSession) -> None:
 def _say_what_happens_after_a_kill(rig: PoweredDrives, joint: str) -> None:
     report = rig.report(joint)
     if report is None or not report.stops_by_itself:
-        typer.secho(CANNOT_STOP, fg=typer.colors.RED, bold=True, color=colour())
+        warn(CANNOT_STOP)
     else:
-        typer.echo(STOPS.format(report.self_stop.text))
-    typer.echo("hold w (forward) or s (backward); release stops; q ends")
+        print(STOPS.format(report.self_stop.text))
+    print("hold w (forward) or s (backward); release stops; q ends")
 
 
 @contextmanager

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-import typer
-
 from canbase_commissioning.bus_monitor import OURS, Listener, ListenSession
 from canbase_commissioning.nmt_command import NodePower, Order, outcome, power_of
 from canbase_commissioning.nmt_session import NmtSession
@@ -18,7 +16,7 @@ from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301.nmt import ALL_NODES, nmt
 from canbase_driver.cia301.sdo_client import SdoClient
-from canbase_runtime.terminal import FAILED, fail, warn
+from canbase_runtime.terminal import FAILED, CommandError, fail, warn
 
 LISTEN_S: Final = 1.0
 WATCH_S: Final = 5.0
@@ -40,9 +38,9 @@ def run_nmt(
             fail("no node is on the bus, as far as it shows; name one", FAILED)
         powers = _powers(line, heard, nodes, robot, timeout_s)
         for power in powers:
-            typer.echo(str(power))
+            print(str(power))
         whom = f"node {node}" if node else f"all nodes ({', '.join(map(str, nodes))})"
-        typer.echo(f"NMT {order.value} to {whom}: {order.effect}")
+        print(f"NMT {order.value} to {whom}: {order.effect}")
         needs_a_person = any(power.needs_a_person for power in powers)
         if needs_a_person and not confirmed("A motor may have power. Send it?", yes=yes):
             fail("nothing sent", FAILED)
@@ -97,6 +95,6 @@ def _send(line: BusSession, node: int, order: Order, nodes: list[int], watch_s: 
 def _tell(order: Order, nodes: list[int], after: Listener) -> None:
     outcomes = [outcome(order, after.nodes.get(each), each) for each in nodes]
     for _, text in outcomes:
-        typer.echo(text)
+        print(text)
     if not all(obeyed for obeyed, _ in outcomes):
-        raise typer.Exit(FAILED)
+        raise CommandError("", FAILED)

@@ -9,8 +9,6 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Final
 
-import typer
-
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.object_dictionary import Address
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
@@ -23,7 +21,7 @@ from canbase_commissioning.parameters.saved import Parameters
 from canbase_config.eds_file import Eds, EdsError, read_eds, read_text
 from canbase_config.robot import Bus, Robot
 from canbase_runtime.own_folder import replaced
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, CommandError, fail, warn
 
 LISTEN_S: Final = 0.4
 DIFFERENT: Final = 3
@@ -42,10 +40,10 @@ class Side:
 
     @classmethod
     def of(cls, word: str) -> Side:
-        """A number is a node id, `boot` the boot of robot.yaml, everything else a file. Raises typer.BadParameter."""
+        """A number is a node id, `boot` the boot of robot.yaml, everything else a file. Raises CommandError."""
         if word.isdecimal():
             if not 1 <= int(word) <= 127:
-                raise typer.BadParameter(f"{word} is no node id: expected 1 to 127, or a file")
+                fail(f"{word} is no node id: expected 1 to 127, or a file", WRONG_INPUT)
             return cls(node=int(word))
         return cls() if word == BOOT else cls(file=Path(word))
 
@@ -81,8 +79,8 @@ def run_save(
             file.write(dcf_text(text, eds, found, heading).encode(encoding))
     except OSError as error:
         fail(f"{out} cannot be written: {error.strerror or error}", FAILED)
-    typer.echo(f"node {node}: {found.identity}")
-    typer.echo(f"{out}: {len(found.values)} objects, {len(found.refused)} without a value")
+    print(f"node {node}: {found.identity}")
+    print(f"{out}: {len(found.values)} objects, {len(found.refused)} without a value")
     tell_refused(found.refused)
 
 
@@ -100,7 +98,7 @@ def tell_refused(refused: Mapping[Address, str]) -> None:
         by_reason[why].append(at)
     for why, places in by_reason.items():
         more = f" and {len(places) - SHOWN} more" if len(places) > SHOWN else ""
-        typer.echo(f"  {why}: {', '.join(map(str, places[:SHOWN]))}{more}")
+        print(f"  {why}: {', '.join(map(str, places[:SHOWN]))}{more}")
 
 
 def run_diff(
@@ -146,22 +144,22 @@ def _file(path: Path) -> tuple[Parameters, Eds]:
 
 
 def _tell(first: Parameters, second: Parameters, found: Comparison) -> None:
-    typer.echo(f"{first.source}: {first.identity}")
-    typer.echo(f"{second.source}: {second.identity}")
+    print(f"{first.source}: {first.identity}")
+    print(f"{second.source}: {second.identity}")
     for problem in (found.product, found.firmware and f"other firmware: {found.firmware}"):
         if problem:
             warn(problem)
     _lines(found.differences)
     if not found.compared:
         fail("the two have no object in common", FAILED)
-    typer.echo(f"{len(found.differences)} of {found.compared} objects differ")
+    print(f"{len(found.differences)} of {found.compared} objects differ")
     if not found.alike:
-        raise typer.Exit(DIFFERENT)
+        raise CommandError("", DIFFERENT)
 
 
 def _lines(differences: tuple[Difference, ...]) -> None:
     for each in differences:
-        typer.echo(str(each))
+        print(str(each))
 
 
 def _diff_with_boot(saved: Parameters, eds: Eds, robot: Robot | None, *, boot_first: bool) -> None:
@@ -172,15 +170,15 @@ def _diff_with_boot(saved: Parameters, eds: Eds, robot: Robot | None, *, boot_fi
         nodes = ", ".join(str(node) for node in sorted({drive.node_id for drive in robot.drives}))
         fail(f"robot.yaml has no drive with node id {saved.node_id}, only {nodes}", WRONG_INPUT)
     found = boot_values(saved, eds, drives, robot)
-    typer.echo(f"{saved.source}: {saved.identity}")
+    print(f"{saved.source}: {saved.identity}")
     written = found.written
     if boot_first:
         written = tuple(replace(each, first=each.second, second=each.first) for each in written)
     _lines(written)
     for note in found.notes:
-        typer.echo(f"  note: {note}")
+        print(f"  note: {note}")
     if found.problem:
         fail(f"the boot would fail: {found.problem}", FAILED)
-    typer.echo(f"the boot sets {len(written)} objects to another value")
+    print(f"the boot sets {len(written)} objects to another value")
     if written:
-        raise typer.Exit(DIFFERENT)
+        raise CommandError("", DIFFERENT)

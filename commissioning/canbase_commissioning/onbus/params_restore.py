@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
-
-import typer
 
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.nmt_session import NmtSession
@@ -71,7 +70,7 @@ def run_restore(
             done = _restore(line, heard, target, what, status_at, timeout_s, without_statusword)
             _tell_restored(done)
     if not what.orders:
-        typer.echo(f"nothing to write: {what.alike} objects have their value")
+        print(f"nothing to write: {what.alike} objects have their value")
     if what.missing:
         fail(f"{len(what.missing)} objects of the file are not in the drive", FAILED)
 
@@ -86,11 +85,11 @@ def _planned(saved: Parameters, now: Parameters, eds: Eds) -> Plan:
         fail(f"nothing written: {why}", FAILED)
     what = plan(saved, now, eds)
     for change in what.changes:
-        typer.echo(str(change))
+        print(str(change))
     for change, why in what.left:
-        typer.echo(f"  stays: {change} ({why})")
+        print(f"  stays: {change} ({why})")
     for at, why in what.missing:
-        typer.echo(f"  not in the drive: {at} ({why})")
+        print(f"  not in the drive: {at} ({why})")
     return what
 
 
@@ -111,7 +110,7 @@ def _restore(
 ) -> Restored:  # fmt: skip
     if what.maps_pdos:
         line.run(NmtSession([nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node)], heard))
-        typer.echo(f"node {node}: NMT pre-operational, because PDOs change")
+        print(f"node {node}: NMT pre-operational, because PDOs change")
     so_far = Restored(len(what.orders))
     steps = restore(what, status_at, so_far, without_statusword=without_statusword)
     session = sdo_session(node, steps, heard, timeout_s)
@@ -123,14 +122,14 @@ def _restore(
 
 
 def _tell_restored(done: Restored) -> None:
-    typer.echo(f"{len(done.written)} objects written and read back")
+    print(f"{len(done.written)} objects written and read back")
     for change, why in done.failed:
-        typer.echo(f"  not written: {change} ({why})", err=True)
+        print(f"  not written: {change} ({why})", file=sys.stderr)
     if done.stopped:
         fail(f"stopped: {done.stopped}", FAILED)
     if done.failed:
         fail(f"{len(done.failed)} writes were refused", FAILED)
-    typer.echo(KEPT)
+    print(KEPT)
 
 
 def run_order(
@@ -157,4 +156,4 @@ def run_order(
         done = result_of(session.tasks[node], line)
     if done.refused:
         fail(f"node {node}: nothing changed: {done.refused}", FAILED)
-    typer.echo(f"node {node}: {told}")
+    print(f"node {node}: {told}")

@@ -6,7 +6,6 @@ import json
 import sys
 from dataclasses import asdict
 
-import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -18,7 +17,7 @@ from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.scan_rows import ScanRow, missing, scan_rows, silent, twins_advice
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301.nmt import MAX_NODE_ID
-from canbase_runtime.terminal import FAILED, colour, fail
+from canbase_runtime.terminal import FAILED, agreed, fail, warn
 
 
 def run(
@@ -56,25 +55,25 @@ def run(
 
 def _explain(roster: Identification, heard: Listener, errors: int) -> None:
     for text in silent(heard.nodes, roster.cards):
-        typer.echo(text, err=True)
+        print(text, file=sys.stderr)
     for reason in roster.lost.values():
-        typer.echo(f"lost while it was read: {reason}", err=True)
+        print(f"lost while it was read: {reason}", file=sys.stderr)
     if errors:
         advice = "two drives with one node id, cable, termination, or a drive with another bit rate (canbase bus adopt)"
-        typer.echo(f"{errors} errors on the wire meanwhile: {advice}?", err=True)
+        print(f"{errors} errors on the wire meanwhile: {advice}?", file=sys.stderr)
 
 
 def _may_ask(masters: list[str], yes: bool) -> bool:
     """Somebody else commands this bus: our questions are harmless to it in most cases, not in all."""
     signs = "\n".join(f"  {sign}" for sign in masters)
-    typer.secho(f"another master is on this bus:\n{signs}", err=True, fg=typer.colors.YELLOW, color=colour())
+    warn(f"another master is on this bus:\n{signs}")
     if yes:
         return True
     told = "scan would send SDO reads beside it; an answer to them may confuse a master that is asking the same node"
     if not sys.stdin.isatty():
-        typer.echo(f"{told}. Listened only; use --yes to read anyway", err=True)
+        print(f"{told}. Listened only; use --yes to read anyway", file=sys.stderr)
         return False
-    return typer.confirm(f"{told}. Read anyway?", default=False, err=True)
+    return agreed(f"{told}. Read anyway?")
 
 
 def _bus_problem(line: BusSession, rows: list[ScanRow]) -> str:
@@ -87,7 +86,7 @@ def _bus_problem(line: BusSession, rows: list[ScanRow]) -> str:
 
 def _print(rows: list[ScanRow], as_json: bool) -> None:
     if as_json:
-        typer.echo(json.dumps([asdict(row) for row in rows]))
+        print(json.dumps([asdict(row) for row in rows]))
     elif rows:
         Console().print(_table(rows))
 

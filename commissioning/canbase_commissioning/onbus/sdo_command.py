@@ -8,8 +8,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final, TypeVar
 
-import typer
-
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.census import ALL, read
 from canbase_commissioning.conversation import Conversation
@@ -33,7 +31,7 @@ from canbase_config.eds_file import EdsError, EdsObject, read_eds
 from canbase_config.robot import Bus, Robot
 from canbase_driver.boot.steps import Steps
 from canbase_driver.cia301.sdo_client import SdoAborted, SdoClient, SdoTimeout
-from canbase_runtime.terminal import FAILED, WRONG_INPUT, colour, fail
+from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, warn
 
 T = TypeVar("T")
 LISTEN_S: Final = 0.4
@@ -59,16 +57,16 @@ class Target:
 
     @classmethod
     def of(cls, node: int, at: str, kind: str | None, eds: Path | None, robot: Robot | None) -> Target:
-        """Of the words of a command line. Raises typer.BadParameter for those that make no sense."""
+        """Of the words of a command line. Raises CommandError for those that make no sense."""
         if kind is not None and kind not in TYPES:
-            raise typer.BadParameter(f"there is no type {kind!r}, expected one of {', '.join(TYPES)}")
+            fail(f"there is no type {kind!r}, expected one of {', '.join(TYPES)}", WRONG_INPUT)
         drives = [drive for drive in robot.drives if drive.node_id == node] if robot else []
         ours = Path(str(files("canbase_config"))) / "eds" / "canbase_cia402.eds"
         try:
             eds_files = [read_eds(path) for path in (eds, ours) if path is not None]
             address = find_object(at, eds_files[:1] if eds else eds_files)
         except (ValueError, EdsError) as error:
-            raise typer.BadParameter(str(error)) from error
+            fail(str(error), WRONG_INPUT)
         known = known_object(address, eds_files, drives[0].kind if drives else None)
         entry = eds_files[0].objects.get((address.index, address.sub)) if eds else None
         return cls(node, address, kind or known.type, known.name, robot, entry)
@@ -89,10 +87,10 @@ def run_read(bus: Bus, target: Target, timeout_s: float, *, raw: bool, ignore_ed
     with open_line(bus) as line:
         data = _transfer(line, target.node, read_object(target.at), _listen(line), timeout_s)
     if raw:
-        typer.echo(decode(data, target.kind))
+        print(decode(data, target.kind))
         return
     words = meaning(target.at, data)
-    typer.echo(f"{target}: {show(data, target.kind)}{f': {words}' if words else ''}{target.by_eds}")
+    print(f"{target}: {show(data, target.kind)}{f': {words}' if words else ''}{target.by_eds}")
 
 
 def run_write(bus: Bus, target: Target, value: str, timeout_s: float, *, force: bool, ignore_eds: bool) -> None:
@@ -121,13 +119,12 @@ def _allowed_by_eds(why: str, target: Target) -> None:
 def _tell(target: Target, done: Written, value: str) -> None:
     before = "?" if done.before is None else show(done.before, target.kind)
     if done.after is None:
-        typer.echo(f"{target}: written; it cannot be read back")
+        print(f"{target}: written; it cannot be read back")
         return
-    typer.echo(f"{target}: {before} → {show(done.after, target.kind)}")
+    print(f"{target}: {before} → {show(done.after, target.kind)}")
     wanted = encode(value, target.kind or f"u{8 * len(done.after)}")
     if done.after.rstrip(b"\0") != wanted.rstrip(b"\0"):
-        text = f"it reads back a value other than {value}: the drive rounds it, or has it set elsewhere"
-        typer.secho(text, err=True, fg=typer.colors.YELLOW, color=colour())
+        warn(f"it reads back a value other than {value}: the drive rounds it, or has it set elsewhere")
 
 
 def _listen(line: BusSession) -> Listener:
@@ -169,4 +166,4 @@ def _or_wrong_value(do: Callable[[], object]) -> None:
     try:
         do()
     except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="VALUE") from error
+        fail(f"VALUE: {error}", WRONG_INPUT)

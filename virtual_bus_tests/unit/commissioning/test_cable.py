@@ -14,6 +14,7 @@ from canbase_commissioning.onbus import cable
 from canbase_commissioning.onbus.cable import Cable
 from canbase_commissioning.onbus.operator import Operator
 from canbase_config.robot import Bus
+from canbase_runtime.terminal import CommandError
 
 CAN0 = Bus(interface="socketcan", channel="can0", bitrate=500_000, extra={})
 
@@ -99,5 +100,5 @@ def test_vcan_has_no_bit_rate(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_to_set_the_interface_one_has_to_be_root(monkeypatch: pytest.MonkeyPatch) -> None:
     Ip(monkeypatch)
     monkeypatch.setattr("os.geteuid", lambda: 1000)
-    with pytest.raises(BaseException, match="1"):
+    with pytest.raises(CommandError, match="needs root"):
         Cable(CAN0, Operator(None, yes=True), sets_link=True)
