@@ -21,7 +21,7 @@ from pathlib import Path
 from accuracy import cases, quantile
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.motion import STOP, Twist
+from canbase_action_server.motion import STOP, BaseTwist
 from canbase_action_server.nav2_request import Target, drive_on_heading, spin
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -46,10 +46,10 @@ class ConstantSpeed:
         self._start, self._distance_m = start.pose, distance_m
         self._speed_mps = math.copysign(speed_mps, distance_m)
 
-    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[BaseTwist, bool]:
         """One cycle."""
         left_m = abs(self._distance_m) - self._driven_m(odometry)
-        return (STOP, True) if left_m <= 0.0 else (Twist(self._speed(left_m)), False)
+        return (STOP, True) if left_m <= 0.0 else (BaseTwist(self._speed(left_m)), False)
 
     def _driven_m(self, odometry: Odometry) -> float:
         return math.hypot(odometry.pose.x_m - self._start.x_m, odometry.pose.y_m - self._start.y_m)
@@ -85,7 +85,7 @@ class Nav2Spin:
     def __init__(self, start: Odometry, angle_rad: float) -> None:
         self._angle_rad, self._last_rad, self._turned_rad = angle_rad, start.pose.yaw_rad, 0.0
 
-    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[BaseTwist, bool]:
         """One cycle."""
         self._turned_rad += math.remainder(odometry.pose.yaw_rad - self._last_rad, 2.0 * math.pi)
         self._last_rad = odometry.pose.yaw_rad
@@ -93,7 +93,7 @@ class Nav2Spin:
         if left_rad < 1e-6:
             return STOP, True
         radps = min(max(math.sqrt(2.0 * self.LIMIT_RADPS2 * left_rad), self.SLOWEST_RADPS), self.FASTEST_RADPS)
-        return Twist(0.0, math.copysign(radps, self._angle_rad)), False
+        return BaseTwist(0.0, math.copysign(radps, self._angle_rad)), False
 
 
 @dataclass(frozen=True, slots=True)

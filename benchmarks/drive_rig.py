@@ -10,9 +10,9 @@ import random
 from collections import deque
 from dataclasses import dataclass
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.motion import STOP, Twist
+from canbase_action_server.motion import STOP, BaseTwist
 from canbase_config.robot import Robot
 from canbase_driver.motion.kinematics import Twist2D, wheel_speeds
 from canbase_driver.motion.limiter import Limiter, MotionState
@@ -47,9 +47,9 @@ class Rig:
         drive = robot.drives[0]
         self._count_m = 2.0 * math.pi * robot.base.wheel_radius_m / (drive.gear_ratio * drive.counts_per_motor_rev)
         self._limiter, self._state = Limiter(robot.limits, robot.base.track_m), MotionState.AT_REST
-        self._pipe: deque[tuple[float, Twist]] = deque()
+        self._pipe: deque[tuple[float, BaseTwist]] = deque()
         self._order = STOP
-        self._pose, self._counts = Pose(0.0, 0.0, 0.0), (0, 0)
+        self._pose, self._counts = BasePose(0.0, 0.0, 0.0), (0, 0)
         self._transit: deque[Odometry] = deque()
         self.odometry = Odometry(0.0, self._pose, 0.0, 0.0)
         self._next_drive = self._next_odometry = 0.0
@@ -64,7 +64,7 @@ class Rig:
         """By encoder, signed, not wrapped."""
         return (self.base.travel_right_m - self.base.travel_left_m) / self._robot.base.track_m
 
-    def order(self, twist: Twist, now_s: float) -> None:
+    def order(self, twist: BaseTwist, now_s: float) -> None:
         """A velocity order enters the chain."""
         self._pipe.append((now_s + self._case.chain_s * self._chance.uniform(0.3, 1.0), twist))
 
@@ -101,7 +101,7 @@ class Rig:
         heading = self._pose.yaw_rad + turned_rad / 2.0
         way_m = (left_m + right_m) / 2.0
         x_m, y_m = self._pose.x_m + way_m * math.cos(heading), self._pose.y_m + way_m * math.sin(heading)
-        self._pose = Pose(x_m, y_m, self._pose.yaw_rad + turned_rad)
+        self._pose = BasePose(x_m, y_m, self._pose.yaw_rad + turned_rad)
 
     def _publish(self, now_s: float) -> None:
         """What the driver's last cycle saw; it arrives late and unevenly."""

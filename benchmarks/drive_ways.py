@@ -9,7 +9,7 @@ from typing import Protocol
 from canbase_action_server.goal_queue import GoalQueue
 from canbase_action_server.goal_request import DriveRequest, Request
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
-from canbase_action_server.motion import STOP, Twist
+from canbase_action_server.motion import STOP, BaseTwist
 from canbase_action_server.outcome import ErrorCode
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
@@ -29,7 +29,7 @@ class Controller(Protocol):
 
     period_s: float
 
-    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[BaseTwist, bool]:
         """The order, and whether this is the result."""
 
 
@@ -41,7 +41,7 @@ class Ours:
         self._goal_queue = GoalQueue(robot)
         self._goal_queue.admit("goal", request, start.received)
 
-    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[BaseTwist, bool]:
         """One control cycle."""
         cycle = self._goal_queue.tick(_inputs(odometry), now_s)
         for end in cycle.ends:
@@ -58,12 +58,12 @@ class Lecture:
     def __init__(self, robot: Robot, case: Case, start: Odometry) -> None:
         self._case, self._start = case, start.pose
 
-    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[BaseTwist, bool]:
         """One turn of the loop."""
         pose = odometry.pose
         if math.hypot(pose.x_m - self._start.x_m, pose.y_m - self._start.y_m) >= abs(self._case.distance_m):
             return STOP, True
-        return Twist(math.copysign(self._case.speed_mps, self._case.distance_m)), False
+        return BaseTwist(math.copysign(self._case.speed_mps, self._case.distance_m)), False
 
 
 class StopProfile:
@@ -75,7 +75,7 @@ class StopProfile:
         self._case, self._start, self._limits = case, start.pose, robot.limits
         self._last_mps = 0.0
 
-    def cycle(self, odometry: Odometry, now_s: float) -> tuple[Twist, bool]:
+    def cycle(self, odometry: Odometry, now_s: float) -> tuple[BaseTwist, bool]:
         """One cycle."""
         pose, limits = odometry.pose, self._limits
         driven_m = math.hypot(pose.x_m - self._start.x_m, pose.y_m - self._start.y_m)
@@ -85,7 +85,7 @@ class StopProfile:
         stop_mps = math.sqrt(2.0 * limits.deceleration_mps2 * left_m)
         speed_mps = min(self._case.speed_mps, self._last_mps + limits.acceleration_mps2 * self.period_s, stop_mps)
         self._last_mps = max(min(MINIMUM_MPS, self._case.speed_mps), speed_mps)
-        return Twist(math.copysign(self._last_mps, self._case.distance_m)), False
+        return BaseTwist(math.copysign(self._last_mps, self._case.distance_m)), False
 
 
 def _inputs(odometry: Odometry) -> Inputs:

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from canbase_action_server.goal import GoalPhase, GoalRun, Order
+from canbase_action_server.goal import CycleResult, GoalPhase, GoalRun
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs
 from canbase_action_server.motion import STOP
 from canbase_action_server.motion_limits import standstill_limits
-from canbase_action_server.outcome import ErrorCode, Outcome
-from canbase_action_server.standstill import Standstill, Verdict
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
+from canbase_action_server.standstill import Standstill, StandstillVerdict
 from canbase_action_server.state_topics import ODOMETRY
 from canbase_config.robot import Robot
 
@@ -49,7 +49,7 @@ class ActiveGoal:
         """Of the goal that owns the base; ENDED when there is none."""
         return self._goal.phase if self._goal else GoalPhase.ENDED
 
-    def take(self, request: Request, inputs: Inputs, now_s: float) -> None:
+    def start(self, request: Request, inputs: Inputs, now_s: float) -> None:
         """The base now belongs to this goal. RuntimeError when it has an owner, or its odometry is lost."""
         start = inputs.odometry.within(ODOMETRY.timeout_s(self._robot), now_s)
         if self.busy or start is None:
@@ -58,10 +58,10 @@ class ActiveGoal:
         self._goal = GoalRun(self._robot, motion, start, now_s, request.terms.time_allowance_s)
         self._began = now_s
 
-    def tick(self, inputs: Inputs, now_s: float) -> Order | None:
+    def tick(self, inputs: Inputs, now_s: float) -> CycleResult | None:
         """One control cycle. None: nothing is ordered, the source publishes nothing."""
         if self._goal is None:
-            return Order(STOP) if now_s < self._silent_from else None
+            return CycleResult(STOP) if now_s < self._silent_from else None
         if self._failure is None:
             order = self._goal.tick(inputs, now_s)
         else:
@@ -78,23 +78,23 @@ class ActiveGoal:
             stop = standstill_limits(self._robot, limits.deceleration_mps2)
             self._failure = Failure(error, Standstill(stop, now_s, limits.linear_mps))
 
-    def give_up(self, code: ErrorCode, message: str, now_s: float) -> Order | None:
+    def give_up(self, code: ErrorCode, message: str, now_s: float) -> CycleResult | None:
         """Ends the goal at once, standing or not, because the process has no more time. None: there was no goal."""
         if self._goal is None:
             return None
         traveled_m = self._goal.traveled_m
         self._release(now_s)
-        return Order(STOP, end=self._timed(Outcome(code, traveled_m, 0.0, message), now_s))
+        return CycleResult(STOP, end=self._timed(GoalOutcome(code, traveled_m, 0.0, message), now_s))
 
-    def _timed(self, end: Outcome, now_s: float) -> Outcome:
+    def _timed(self, end: GoalOutcome, now_s: float) -> GoalOutcome:
         return replace(end, duration_s=now_s - self._began)
 
-    def _end_failed(self, failure: Failure, traveled_m: float, inputs: Inputs, now_s: float) -> Order:
+    def _end_failed(self, failure: Failure, traveled_m: float, inputs: Inputs, now_s: float) -> CycleResult:
         verdict = failure.standstill.judge(inputs, now_s)
-        if verdict is Verdict.WAIT:
-            return Order(STOP)
+        if verdict is StandstillVerdict.WAIT:
+            return CycleResult(STOP)
         message = f"defect in the action server ({failure.error!r}), see its log; the base {verdict.value}"
-        return Order(STOP, end=Outcome(ErrorCode.INTERNAL, traveled_m, 0.0, message))
+        return CycleResult(STOP, end=GoalOutcome(ErrorCode.INTERNAL, traveled_m, 0.0, message))
 
     def _release(self, now_s: float) -> None:
         self._goal = None

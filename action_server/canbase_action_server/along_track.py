@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class BasePose:
     """Pose of the base in the odometry frame: position [m], heading [rad, counter-clockwise positive]."""
 
     x_m: float
@@ -35,7 +35,7 @@ def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def displacement(start: Pose, pose: Pose) -> Displacement:
+def displacement(start: BasePose, pose: BasePose) -> Displacement:
     """`pose` as seen from `start`."""
     dx_m, dy_m = pose.x_m - start.x_m, pose.y_m - start.y_m
     cos, sin = math.cos(start.yaw_rad), math.sin(start.yaw_rad)

@@ -8,7 +8,7 @@ from typing import Any
 
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import Request
-from canbase_action_server.outcome import Outcome
+from canbase_action_server.outcome import GoalOutcome
 
 DEFECT = "defect in the action server, see its log"
 
@@ -21,6 +21,6 @@ class Binding:
     type: type
     request: Callable[[Any], Request]
     feedback: Callable[[Feedback], Any]
-    result: Callable[[Outcome], Any]
+    result: Callable[[GoalOutcome], Any]
     defect: Any
     """The result of a goal whose own one cannot be made."""

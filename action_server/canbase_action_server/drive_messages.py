@@ -7,7 +7,7 @@ from canbase.action import DriveDistance
 from canbase_action_server.binding import DEFECT, Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import DriveRequest
-from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
 
 
 def drive_binding() -> Binding:
@@ -24,7 +24,7 @@ def _feedback(feedback: Feedback) -> DriveDistance.Feedback:
     return DriveDistance.Feedback(traveled_m=feedback.traveled_m, remaining_m=feedback.remaining_m)
 
 
-def _result(outcome: Outcome) -> DriveDistance.Result:
+def _result(outcome: GoalOutcome) -> DriveDistance.Result:
     return DriveDistance.Result(
         error_code=int(outcome.code),
         traveled_m=outcome.traveled_m,

@@ -12,10 +12,10 @@ from enum import Enum
 
 from canbase_action_server.causes import ARRIVED, Situation, cause_while_driving, cause_while_stopping
 from canbase_action_server.inputs import Inputs, Odometry
-from canbase_action_server.motion import STOP, Motion, Twist
+from canbase_action_server.motion import STOP, BaseTwist, Motion
 from canbase_action_server.motion_limits import standstill_limits
-from canbase_action_server.outcome import ErrorCode, Outcome
-from canbase_action_server.standstill import Standstill, Verdict
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
+from canbase_action_server.standstill import Standstill, StandstillVerdict
 from canbase_action_server.state_topics import States
 from canbase_config.robot import Robot
 
@@ -49,12 +49,12 @@ class Feedback:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class CycleResult:
     """The result of one control cycle."""
 
-    twist: Twist
+    twist: BaseTwist
     feedback: Feedback | None = None
-    end: Outcome | None = None
+    end: GoalOutcome | None = None
 
 
 class GoalRun:
@@ -94,7 +94,7 @@ class GoalRun:
         """Along the way, signed [m]."""
         return self._motion.traveled_m
 
-    def tick(self, inputs: Inputs, now_s: float) -> Order:
+    def tick(self, inputs: Inputs, now_s: float) -> CycleResult:
         """The order of this cycle, the feedback, and whether the goal has ended. RuntimeError after the end."""
         if self._phase is GoalPhase.ENDED:
             raise RuntimeError("the goal has ended: it orders nothing any more")
@@ -139,54 +139,56 @@ class GoalRun:
             overall_timeout_s=self._overall_s,
         )
 
-    def _drive(self, situation: Situation) -> Order:
+    def _drive(self, situation: Situation) -> CycleResult:
         now_s, cause = situation.now_s, cause_while_driving(situation)
         if cause and cause.code is ErrorCode.NO_PROGRESS and self._near_enough():
             cause = ARRIVED
         twist = None if cause else self._motion.order(now_s)
         if twist is not None:
-            return Order(twist)
+            return CycleResult(twist)
         self._cause = cause or ARRIVED
         self._go(GoalPhase.STOPPING)
         limits = standstill_limits(self._robot, self._motion.deceleration_mps2)
         self._standstill = Standstill(limits, now_s, self._motion.speed_mps(self._last_odometry))
-        return Order(self._motion.stop(now_s))
+        return CycleResult(self._motion.stop(now_s))
 
-    def _stop(self, situation: Situation) -> Order:
+    def _stop(self, situation: Situation) -> CycleResult:
         now_s = situation.now_s
         self._motion.stop(now_s)
         self._cause = cause_while_stopping(situation, self._cause) or self._cause
-        verdict = self._standstill.judge(situation.inputs, now_s) if self._standstill else Verdict.WAIT
+        verdict = self._standstill.judge(situation.inputs, now_s) if self._standstill else StandstillVerdict.WAIT
         if self._cause.hands_over:
-            verdict = Verdict.HANDED_OVER
-        if verdict is Verdict.WAIT:
-            return Order(STOP)
+            verdict = StandstillVerdict.HANDED_OVER
+        if verdict is StandstillVerdict.WAIT:
+            return CycleResult(STOP)
         if self._stands_short(verdict):
             self._go(GoalPhase.DRIVING)
             self._progress_time = now_s
-            return Order(STOP)
+            return CycleResult(STOP)
         self._go(GoalPhase.ENDED)
-        return Order(STOP, end=self._outcome(verdict))
+        return CycleResult(STOP, end=self._outcome(verdict))
 
     def _near_enough(self) -> bool:
         return abs(self._motion.remaining_m) <= self._robot.action.tolerance_m
 
-    def _stands_short(self, verdict: Verdict) -> bool:
-        wanted = self._cause.code is ErrorCode.OK and verdict is Verdict.STANDS
+    def _stands_short(self, verdict: StandstillVerdict) -> bool:
+        wanted = self._cause.code is ErrorCode.OK and verdict is StandstillVerdict.STANDS
         return wanted and self._motion.remaining_m > self._robot.action.tolerance_m
 
-    def _outcome(self, verdict: Verdict) -> Outcome:
+    def _outcome(self, verdict: StandstillVerdict) -> GoalOutcome:
         motion, cause = self._motion, self._cause
-        if verdict is Verdict.STILL_MOVES and cause.code.leaves_the_base_standing:
+        if verdict is StandstillVerdict.STILL_MOVES and cause.code.leaves_the_base_standing:
             cause = replace(cause, code=ErrorCode.DRIVE_FAULT, message=self._unconfirmed())
         elif cause.code is ErrorCode.OK and motion.overshoot_m > self._robot.action.tolerance_m:
             message = "the base rolled past the goal: too fast for its load or the slope, or the computer was late"
             cause = replace(cause, code=ErrorCode.OVERSHOOT, message=message)
-        elif verdict is not Verdict.STANDS:
+        elif verdict is not StandstillVerdict.STANDS:
             cause = replace(cause, message=f"{cause.message}; the base {verdict.value}")
         went = motion.report()
         text = f"{cause.message}; {went}" if cause.message else f"{went}; at standstill"
-        return Outcome(cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is Verdict.STANDS)
+        return GoalOutcome(
+            cause.code, motion.traveled_m, max(0.0, motion.overshoot_m), text, verdict is StandstillVerdict.STANDS
+        )
 
     def _unconfirmed(self) -> str:
         odometry, limit_mps = self._last_odometry, self._robot.base.standstill_mps

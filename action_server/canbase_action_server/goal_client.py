@@ -164,7 +164,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         return SentGoal(self, handle, self._result_of(handle), watch)
 
     def _on_rejection(self, rejection: DiagnosticStatus) -> None:
-        self._reasons.take([(each.key, each.value) for each in rejection.values], rejection.message)
+        self._reasons.take_rejection([(each.key, each.value) for each in rejection.values], rejection.message)
 
     def close(self) -> None:
         """Leaves the action."""

@@ -25,13 +25,13 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from canbase_action_server.active_goal import ActiveGoal
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.causes import CLIENT_SILENT
-from canbase_action_server.goal import Feedback, GoalPhase, Order
+from canbase_action_server.goal import CycleResult, Feedback, GoalPhase
 from canbase_action_server.goal_request import Request
 from canbase_action_server.inputs import Inputs, Odometry
-from canbase_action_server.motion import STOP, Twist
-from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.motion import STOP, BaseTwist
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
 from canbase_action_server.preconditions import commanding_program, is_moving, state_reason
 from canbase_action_server.state_topics import STATE_TOPICS, States, without_contested
 from canbase_config.robot import Robot
@@ -39,7 +39,7 @@ from canbase_runtime.received import NEVER, Received
 
 WAITING_FEEDBACK_HZ = 1.0
 """Like the slowest `action.feedback_hz`; a hundred goals may wait."""
-NOWHERE = Odometry(0.0, Pose(0.0, 0.0, 0.0), 0.0, 0.0)
+NOWHERE = Odometry(0.0, BasePose(0.0, 0.0, 0.0), 0.0, 0.0)
 """The length of a goal does not depend on where it begins."""
 
 
@@ -48,7 +48,7 @@ class End:
     """The end of the goal `key`."""
 
     key: str
-    outcome: Outcome
+    outcome: GoalOutcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Against:
 class Cycle:
     """The result of one control cycle."""
 
-    twist: Twist | None = None
+    twist: BaseTwist | None = None
     """The order for the base; None: nothing is ordered, the source publishes nothing."""
     began: str | None = None
     """Key of the goal that owns the base from now on."""
@@ -140,10 +140,10 @@ class GoalQueue:
 
     def cancel(self, key: str) -> bool:
         """A client wants the goal to end. False: no such goal runs or waits."""
-        found = [goal for goal in self._goals() if goal.key == key]
-        for goal in found:
+        matching = [goal for goal in self._goals() if goal.key == key]
+        for goal in matching:
             goal.canceled = True
-        return bool(found)
+        return bool(matching)
 
     def keepalive(self, key: str, now_s: float) -> None:
         """The client of this goal lives. Nothing happens when no such goal runs or waits."""
@@ -227,7 +227,7 @@ class GoalQueue:
             return None
         if self._waits_for_release(goal, inputs, now_s):
             return None
-        self._owner.take(goal.request, inputs, now_s)
+        self._owner.start(goal.request, inputs, now_s)
         self._running = self._waiting.popleft()
         return goal.key
 
@@ -248,7 +248,7 @@ class GoalQueue:
     def _whole_way_m(self, request: Request) -> float:
         return request.motion(self._robot, NOWHERE).remaining_m
 
-    def _ended(self, order: Order) -> tuple[End, ...]:
+    def _ended(self, order: CycleResult) -> tuple[End, ...]:
         """The end of the running goal, if this is one, and of those that may not follow it."""
         if self._running is None or order.end is None:
             return ()
@@ -263,5 +263,5 @@ class GoalQueue:
         return ends
 
 
-def _not_started(cause: Against) -> Outcome:
-    return Outcome(cause.code, 0.0, 0.0, f"{cause.message}; it never started")
+def _not_started(cause: Against) -> GoalOutcome:
+    return GoalOutcome(cause.code, 0.0, 0.0, f"{cause.message}; it never started")

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.received import NEVER, Received
 from canbase_runtime.stop_cause import StopCause
@@ -22,7 +22,7 @@ class Odometry:
 
     received: float
     """The motion is measured between these times; `Received` decides whether it still counts."""
-    pose: Pose
+    pose: BasePose
     linear_mps: float
     angular_radps: float
 

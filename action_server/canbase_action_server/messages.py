@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from canbase.msg import DriverStatus, MuxState, SafetyState
 from nav_msgs.msg import Odometry as OdometryMessage
 
-from canbase_action_server.along_track import Pose, yaw_of_quaternion
+from canbase_action_server.along_track import BasePose, yaw_of_quaternion
 from canbase_action_server.inputs import Driver, Mux, Odometry, Safety
 from canbase_runtime.chain_topics import ChainTopic
 from canbase_runtime.driver_state import driver_state
@@ -20,7 +20,7 @@ def odometry_in(message: OdometryMessage, received: float) -> Odometry | None:
     """From odom; None when a field that counts is NaN or infinite."""
     at, turn, speed = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
     yaw_rad = yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w)
-    odometry = Odometry(received, Pose(at.x, at.y, yaw_rad), speed.linear.x, speed.angular.z)
+    odometry = Odometry(received, BasePose(at.x, at.y, yaw_rad), speed.linear.x, speed.angular.z)
     return odometry if odometry.finite() else None
 
 

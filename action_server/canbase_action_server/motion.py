@@ -18,14 +18,14 @@ JUMP_M = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Twist:
+class BaseTwist:
     """A velocity order for the base, REP 103."""
 
     linear_mps: float = 0.0
     angular_radps: float = 0.0
 
 
-STOP = Twist()
+STOP = BaseTwist()
 
 
 class Motion(ABC):
@@ -69,12 +69,12 @@ class Motion(ABC):
         self.overshoot_m = max(self.overshoot_m, -self.remaining_m)
         return True
 
-    def order(self, now_s: float) -> Twist | None:
+    def order(self, now_s: float) -> BaseTwist | None:
         """The velocity to order now. None: order to stand, the way is gone."""
         speed_mps = self._profile.order(self.remaining_m, self._last.received, now_s)
         return None if speed_mps is None else self._twist(speed_mps)
 
-    def stop(self, now_s: float) -> Twist:
+    def stop(self, now_s: float) -> BaseTwist:
         """The order to stand, remembered by the profile."""
         self._profile.stop(now_s)
         return STOP
@@ -105,5 +105,5 @@ class Motion(ABC):
         """The newest pose; `_last` is still the one before."""
 
     @abstractmethod
-    def _twist(self, speed_mps: float) -> Twist:
+    def _twist(self, speed_mps: float) -> BaseTwist:
         """The order for this speed along the way, >= 0."""

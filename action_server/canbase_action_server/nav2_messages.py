@@ -16,7 +16,7 @@ from canbase_action_server.binding import DEFECT, Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.motion_limits import lever_m
 from canbase_action_server.nav2_request import BehaviorRequest, Target, back_up, drive_on_heading, spin
-from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
 from canbase_config.robot import Robot
 
 CODES = {
@@ -75,7 +75,7 @@ def _angle(lever: float, feedback: Feedback) -> Any:
     return Spin.Feedback(angular_distance_traveled=feedback.traveled_m / lever)
 
 
-def _result(kind: Any, outcome: Outcome) -> Any:
+def _result(kind: Any, outcome: GoalOutcome) -> Any:
     text = outcome.message if outcome.code is ErrorCode.OK else f"{outcome.code.name}: {outcome.message}"
     elapsed = _duration(outcome.duration_s)
     return kind.Result(error_code=error_code(kind, outcome.code), error_msg=text, total_elapsed_time=elapsed)

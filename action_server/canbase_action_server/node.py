@@ -38,7 +38,7 @@ from canbase_action_server.goal_client import REJECTION_QOS, SERVICE_QOS
 from canbase_action_server.goal_queue import Cycle, End, GoalQueue
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Inputs
-from canbase_action_server.motion import STOP, Twist
+from canbase_action_server.motion import STOP, BaseTwist
 from canbase_action_server.open_goal import OpenGoal, goal_numbers, measured_numbers, rejection, uuid_of
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_config.robot import Robot
@@ -163,7 +163,7 @@ class DriveDistanceServer(Node):
     def _on_odometry(self, serialized: bytes) -> None:
         self._odometry_waiting = serialized, time.monotonic()
 
-    def _look(self) -> Inputs:
+    def _newest(self) -> Inputs:
         """What was received, odometry too. To take a message of odom apart costs more than to receive it."""
         if self._odometry_waiting is not None:
             (serialized, received_s), self._odometry_waiting = self._odometry_waiting, None
@@ -212,7 +212,9 @@ class DriveDistanceServer(Node):
         now_s = time.monotonic()
         old = OLD if self._request_times.waited(now_s) else None
         reason = (
-            old or self._second_server(binding) or self._goal_queue.refusal(binding.request(goal), self._look(), now_s)
+            old
+            or self._second_server(binding)
+            or self._goal_queue.refusal(binding.request(goal), self._newest(), now_s)
         )
         if reason is None:
             return GoalResponse.ACCEPT
@@ -263,7 +265,7 @@ class DriveDistanceServer(Node):
             if goal.handle.is_cancel_requested:
                 self._goal_queue.cancel(uuid)
         running, before = self._goal_queue.running, self._goal_queue.phase
-        cycle = self._goal_queue.tick(self._look(), time.monotonic())
+        cycle = self._goal_queue.tick(self._newest(), time.monotonic())
         if self._goal_queue.phase is not before:
             self._log_phase(running, before, cycle)
         self._carry_out(cycle)
@@ -285,7 +287,7 @@ class DriveDistanceServer(Node):
         for end in cycle.ends:
             self._log_end(self._open[end.key], end)
 
-    def _order(self, twist: Twist) -> None:
+    def _order(self, twist: BaseTwist) -> None:
         stamp = self.get_clock().now().to_msg()
         self._orders.publish(self._serialized.pack(twist.linear_mps, twist.angular_radps, stamp))
 
@@ -300,8 +302,8 @@ class DriveDistanceServer(Node):
 
     def _write_log(self, step: GoalStep, uuid: str | None, fields: dict[str, Any], priority: Priority) -> None:
         text = json.dumps({"uuid": uuid, "step": step.value, **fields})
-        told = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
-        self._event_log.write(text, priority, robot=self._robot.name, goal=uuid, step=step.value, **told)
+        entry = {name: fields[name] for name in ("status", "error_code", "reason") if name in fields}
+        self._event_log.write(text, priority, robot=self._robot.name, goal=uuid, step=step.value, **entry)
 
     def _log_phase(self, uuid: str | None, before: GoalPhase, cycle: Cycle) -> None:
         if self._goal_queue.phase is GoalPhase.STOPPING:

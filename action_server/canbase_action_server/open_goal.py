@@ -12,7 +12,7 @@ from rclpy.action.server import GoalEvent, ServerGoalHandle
 
 from canbase_action_server.binding import Binding
 from canbase_action_server.goal import Feedback
-from canbase_action_server.outcome import Outcome, Status
+from canbase_action_server.outcome import GoalOutcome, Status
 from canbase_action_server.rejection import as_texts
 
 
@@ -23,12 +23,12 @@ def uuid_of(handle: ServerGoalHandle) -> str:
 
 def exact(goal: Any) -> dict[str, float]:
     """The numbers of a goal by name, not rounded; those of a message in it as "target.x"."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for name in goal.get_fields_and_field_types():
         value = getattr(goal, name)
         inner = exact(value) if hasattr(value, "get_fields_and_field_types") else None
-        found |= {name: float(value)} if inner is None else {f"{name}.{key}": each for key, each in inner.items()}
-    return found
+        values |= {name: float(value)} if inner is None else {f"{name}.{key}": each for key, each in inner.items()}
+    return values
 
 
 def rejection(name: str, goal: Any, reason: str) -> DiagnosticStatus:
@@ -60,7 +60,7 @@ class OpenGoal:
     binding: Binding
     accepted: float
     executing: bool = False
-    outcome: Outcome | None = None
+    outcome: GoalOutcome | None = None
     feedback: dict[str, float] = field(default_factory=dict)
     """The numbers of the last feedback, for the log."""
     feedback_logged: float = 0.0
@@ -113,7 +113,7 @@ class OpenGoal:
         self.feedback_logged = now_s
         return True
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, outcome: GoalOutcome) -> None:
         """Has the execute callback called. A goal that never ran passes through EXECUTING, as the protocol wants it."""
         self.execute()
         self.outcome = outcome

@@ -47,7 +47,7 @@ class ErrorCode(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class GoalOutcome:
     """The end of a goal, as the client will read it."""
 
     code: ErrorCode

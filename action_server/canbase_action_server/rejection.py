@@ -33,7 +33,7 @@ class Reasons:
         """A goal with these numbers is sent now: what was received before is about others."""
         self._goal, self._found = _bits(goal.items()), None
 
-    def take(self, texts: Iterable[tuple[str, str]], reason: str) -> None:
+    def take_rejection(self, texts: Iterable[tuple[str, str]], reason: str) -> None:
         """The server has rejected a goal with these numbers. The first that fits counts; no unreadable one."""
         if self._found is not None or not reason:
             return

@@ -8,7 +8,7 @@ from canbase_action_server.binding import DEFECT, Binding
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_request import RotateRequest
 from canbase_action_server.motion_limits import lever_m
-from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
 from canbase_config.robot import Robot
 
 
@@ -19,7 +19,7 @@ def rotate_binding(robot: Robot) -> Binding:
     def feedback_out(feedback: Feedback) -> RotateAngle.Feedback:
         return RotateAngle.Feedback(turned_rad=feedback.traveled_m / lever, remaining_rad=feedback.remaining_m / lever)
 
-    def result_out(outcome: Outcome) -> RotateAngle.Result:
+    def result_out(outcome: GoalOutcome) -> RotateAngle.Result:
         return RotateAngle.Result(
             error_code=int(outcome.code),
             turned_rad=outcome.traveled_m / lever,

@@ -23,7 +23,7 @@ BRAKING_RESERVE_S = 0.5
 """Added to the time that braking takes when nothing can be measured."""
 
 
-class Verdict(Enum):
+class StandstillVerdict(Enum):
     """What is known about the base now."""
 
     WAIT = "not known to be at standstill yet"
@@ -60,7 +60,7 @@ class Standstill:
         self._anchor: Odometry | None = None
         """Where the pose has not moved since."""
 
-    def judge(self, inputs: Inputs, now_s: float) -> Verdict:
+    def judge(self, inputs: Inputs, now_s: float) -> StandstillVerdict:
         """Call once per control cycle."""
         odometry = inputs.odometry.within(self._limits.odometry_timeout_s, now_s)
         driver = inputs.driver.within(self._limits.driver_timeout_s, now_s)
@@ -71,7 +71,7 @@ class Standstill:
         self._standing_since = self._anchor = None
         if driver is not None:
             return self._or_give_up(reported, now_s)
-        return Verdict.NOT_MEASURED if now_s >= self._braked else Verdict.WAIT
+        return StandstillVerdict.NOT_MEASURED if now_s >= self._braked else StandstillVerdict.WAIT
 
     def _seen_standing(self, odometry: Odometry) -> bool:
         limits = self._limits
@@ -94,7 +94,7 @@ class Standstill:
         quiet = abs(odometry.linear_mps) <= limits.noise_mps and abs(odometry.angular_radps) <= limits.noise_radps
         return quiet and odometry.received - self._anchor.received >= STILL_S
 
-    def _or_give_up(self, stands: bool, now_s: float) -> Verdict:
+    def _or_give_up(self, stands: bool, now_s: float) -> StandstillVerdict:
         if stands:
-            return Verdict.STANDS
-        return Verdict.STILL_MOVES if now_s >= self._give_up else Verdict.WAIT
+            return StandstillVerdict.STANDS
+        return StandstillVerdict.STILL_MOVES if now_s >= self._give_up else StandstillVerdict.WAIT

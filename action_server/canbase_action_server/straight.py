@@ -6,7 +6,7 @@ import math
 
 from canbase_action_server.along_track import Displacement, displacement
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.motion import Motion, Twist
+from canbase_action_server.motion import BaseTwist, Motion
 from canbase_action_server.profile import ProfileLimits
 
 HEADING_GAIN_PER_S = 1.5
@@ -59,9 +59,9 @@ class StraightMotion(Motion):
     def _take_in(self, odometry: Odometry) -> None:
         self._now_at = displacement(self._start, odometry.pose)
 
-    def _twist(self, speed_mps: float) -> Twist:
+    def _twist(self, speed_mps: float) -> BaseTwist:
         at = self._now_at
         velocity_mps = self._sign * speed_mps
         wanted_radps = -HEADING_GAIN_PER_S * at.heading_rad - LATERAL_GAIN_PER_M * velocity_mps * at.lateral_m
         most_radps = STEERING_RADPM * speed_mps
-        return Twist(velocity_mps, max(-most_radps, min(most_radps, wanted_radps)))
+        return BaseTwist(velocity_mps, max(-most_radps, min(most_radps, wanted_radps)))

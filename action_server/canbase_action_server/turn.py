@@ -6,7 +6,7 @@ import math
 
 from canbase_action_server.along_track import displacement
 from canbase_action_server.inputs import Odometry
-from canbase_action_server.motion import Motion, Twist
+from canbase_action_server.motion import BaseTwist, Motion
 from canbase_action_server.profile import ProfileLimits
 
 
@@ -61,5 +61,5 @@ class TurnMotion(Motion):
         """Since the last pose, the short way round: no base turns half a turn between two messages."""
         return math.remainder(odometry.pose.yaw_rad - self._last.pose.yaw_rad, 2.0 * math.pi)
 
-    def _twist(self, speed_mps: float) -> Twist:
-        return Twist(0.0, self._sign * speed_mps / self._lever_m)
+    def _twist(self, speed_mps: float) -> BaseTwist:
+        return BaseTwist(0.0, self._sign * speed_mps / self._lever_m)

@@ -135,7 +135,7 @@ class _Replayer:
             "lock": self._lock,
             "foreign": lambda at_s, found: mux.on_foreign([Foreign(**each) for each in found]),
             "publishers": lambda at_s, topic, nodes, keys: mux.on_publishers(topic, nodes, keys),
-            "obey": lambda at_s, received: safety.on_command(self._order, received),
+            "obey": lambda at_s, received: safety.accept_command(self._order, received),
             "estop": lambda at_s, pressed, received: safety.on_estop(pressed, received),
             "buttons": lambda at_s, count, why: safety.on_estop_publishers(count, why),
             "scan": self._scan,
@@ -164,7 +164,7 @@ class _Replayer:
     def _command(self, at_s: float, name: str, v: float, w: float, received: float, times: Any) -> None:
         if name in self._config.mux.sources:
             sent = None if times is None else Sent(times[0], times[1], at_s)
-            self._mux.on_command(name, Twist(v, w), received, at_s, sent)
+            self._mux.accept_command(name, Twist(v, w), received, at_s, sent)
 
     def _lock(self, at_s: float, name: str, locked: bool, received: float) -> None:
         if name in self._config.mux.locks:

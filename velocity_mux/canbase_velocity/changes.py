@@ -13,7 +13,7 @@ from canbase_velocity.decision import Action, Decision
 from canbase_velocity.mux import MuxDecision
 from canbase_velocity.safety_filter import ScanState
 
-Told = tuple[str, Priority, dict[str, str]]
+LogLine = tuple[str, Priority, dict[str, str]]
 
 AGAIN_S: Final = 10.0
 """Scans that are dropped all the time are reported again after this time [s]."""
@@ -25,7 +25,7 @@ STOP_PRIORITY: Final = {
 """Of a stop. An obstacle is what the filter is for; each other cause is one that somebody should look at."""
 
 
-def changes(before: MuxDecision, now: MuxDecision) -> Iterator[Told]:
+def changes(before: MuxDecision, now: MuxDecision) -> Iterator[LogLine]:
     """Locks that hold or release, and the source that drives. A source that lost the base to a lock is a notice, as is
     one that is not followed.
     """
@@ -52,7 +52,7 @@ class DropTeller:
     def __init__(self) -> None:
         self._told: dict[str, tuple[StopCause, float]] = {}
 
-    def news(self, scans: Sequence[ScanState], now_s: float) -> Iterator[Told]:
+    def news(self, scans: Sequence[ScanState], now_s: float) -> Iterator[LogLine]:
         """The report at the time `now_s` [s, monotonic]."""
         for scan in scans:
             why = scan.problem or scan.why_dropped
@@ -79,7 +79,7 @@ def _standing(decision: MuxDecision) -> SourceStanding | None:
     return None if decision.holder is None else decision.holder.standing
 
 
-def changed_order(now: Decision) -> Told:
+def changed_order(now: Decision) -> LogLine:
     """What the filter does from now on, and what ends it."""
     stops = now.action is Action.STOP
     otherwise = Priority.NOTICE if now.emergency else Priority.INFO

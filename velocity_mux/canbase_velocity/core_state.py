@@ -84,8 +84,8 @@ def attributes(thing: Any) -> Iterator[tuple[str, Any]]:
 
 def array(values: Any) -> dict[str, Any]:
     """Numbers of one kind: exact, and short."""
-    found = np.asarray(values)
-    return {"array": base64.b64encode(found.tobytes()).decode(), "kind": found.dtype.str, "shape": list(found.shape)}
+    data = np.asarray(values)
+    return {"array": base64.b64encode(data.tobytes()).decode(), "kind": data.dtype.str, "shape": list(data.shape)}
 
 
 def _name(kind: type) -> str:

@@ -44,7 +44,7 @@ class Delay:
         self._stamp_s = -math.inf
         self.set_back = False
 
-    def take(self, sent: Sent) -> float:
+    def measure(self, sent: Sent) -> float:
         """The delay of a message [s]; negative only with `same_clock`, for a stamp from the future."""
         self.set_back = sent.stamp_s < self._stamp_s - SET_BACK_S
         self._stamp_s = sent.stamp_s

@@ -157,7 +157,7 @@ class FilterNode(Node):
         for scan in scans:
             callback = functools.partial(self._on_scan, scan, HeldPlacement())
             self.create_subscription(LaserScan, scan.topic, callback, SCAN)
-        steady_timer(self, GRAPH_PERIOD_S, self._look_for_scanners)
+        steady_timer(self, GRAPH_PERIOD_S, self._check_scan_publishers)
         if any(scan.pose == "tf" for scan in scans):
             if messages.TFMessage is None:
                 raise ModuleNotFoundError("a scanner with `pose: tf` needs tf2_msgs; install ros-jazzy-tf2-msgs")
@@ -167,7 +167,7 @@ class FilterNode(Node):
         """Takes the order of the mux at `now_s` [s, time.monotonic], and issues it as far as it may."""
         received = self._receive_times.at(now_s)
         self._note("obey", now_s, received)
-        self._filter.on_command(twist, received)
+        self._filter.accept_command(twist, received)
         self._timer.reset()  # a mux faster than the timer is not doubled by it
         self._decide(now_s)
 
@@ -193,10 +193,10 @@ class FilterNode(Node):
 
     def _count_buttons(self) -> None:
         before, topic = self._filter.estop_crowd, self.resolve_topic_name(self._robot.safety.estop.topic)
-        found = publishers(self, topic)
-        other = (each for each in found if each.kind != BUTTON_KIND)
+        on_topic = publishers(self, topic)
+        other = (each for each in on_topic if each.kind != BUTTON_KIND)
         unheard = (f"{each.node or UNKNOWN} publishes it as {each.kind}, which is not received" for each in other)
-        count, why = sum(each.kind == BUTTON_KIND for each in found), next(unheard, "")
+        count, why = sum(each.kind == BUTTON_KIND for each in on_topic), next(unheard, "")
         self._note("buttons", time.monotonic(), count, why)
         self._filter.on_estop_publishers(count, why)
         crowd = self._filter.estop_crowd
@@ -221,7 +221,7 @@ class FilterNode(Node):
         self._note("scan", now_s, config.topic, scan, placement if config.pose == "tf" else None, wall_s)
         self._filter.on_laser_scan(config.topic, scan, placement, now_s, wall_s)
 
-    def _look_for_scanners(self) -> None:
+    def _check_scan_publishers(self) -> None:
         """Into the ROS graph: a message does not contain its publisher."""
         now_s = time.monotonic()
         for scan in self._robot.safety.scans:
@@ -275,11 +275,11 @@ class FilterNode(Node):
             return
         if self._keeper.failure is not None:
             raise self._keeper.failure
-        found = self._keeper.written, self._keeper.problem
-        if found != self._noted:
-            self._noted = found
-            self._note("record", time.monotonic(), found[0] and asdict(found[0]), found[1])
-        self._filter.on_record(*found)
+        record = self._keeper.written, self._keeper.problem
+        if record != self._noted:
+            self._noted = record
+            self._note("record", time.monotonic(), record[0] and asdict(record[0]), record[1])
+        self._filter.on_record(*record)
         self._keeper.want(self._filter.record)
 
     def _diagnose(self) -> None:

@@ -91,7 +91,7 @@ class _Scanner:
         except ScanError as error:
             self.drop(StopCause.SCAN_INVALID, str(error))
             return
-        frozen = self._frozen.look(scan, now_s, moves=moves)
+        frozen = self._frozen.check_scan(scan, now_s, moves=moves)
         if frozen:
             self.drop(StopCause.SCAN_FROZEN, frozen, at_once=True)
             return
@@ -104,13 +104,15 @@ class _Scanner:
             self.drop(StopCause.SCAN_STALE, why_late)
             return
         self._share = view.share
-        self.take(view.points, view.field, now_s - self._frozen.since + scan.scan_time_s + max(late_s, 0.0), now_s)
+        self.accept_points(
+            view.points, view.field, now_s - self._frozen.since + scan.scan_time_s + max(late_s, 0.0), now_s
+        )
 
     def _late_s(self, scan: Scan, now_s: float, wall_s: float) -> float:
         """[s]. The stamps of a simulator are of its own time, which may be slower."""
         if scan.stamp_ns is None or not self.config.noisy:
             return 0.0
-        return self._delay.take(Sent(scan.stamp_ns * 1e-9, wall_s, now_s))
+        return self._delay.measure(Sent(scan.stamp_ns * 1e-9, wall_s, now_s))
 
     def drop(self, cause: StopCause, why: str, *, at_once: bool = False) -> None:
         """A scan that does not count. `at_once`: neither does the one before; otherwise that counts until it is old."""
@@ -118,7 +120,7 @@ class _Scanner:
         self._cause, self._why_dropped = cause, why
         self._problem = why if at_once else self._problem
 
-    def take(self, points: Points, field: Field | None, scan_time_s: float, now_s: float) -> None:
+    def accept_points(self, points: Points, field: Field | None, scan_time_s: float, now_s: float) -> None:
         """A scan with readings; its first reading was taken `scan_time_s` before."""
         limits = self._geometry.limits
         since_s = min(self._seen.age_s(now_s), self.config.timeout_s)
@@ -207,7 +209,7 @@ class SafetyFilter:
         """Takes a speed limit that holds from now on, and who has set it."""
         self._speed_limit, self._speed_limit_by = limit, by
 
-    def on_command(self, twist: Twist, now_s: float) -> None:
+    def accept_command(self, twist: Twist, now_s: float) -> None:
         """Takes a command of cmd_vel_mux, also one with NaN: that stops."""
         self._command = Received(twist, now_s)
 
@@ -215,7 +217,7 @@ class SafetyFilter:
         self, topic: str, points: Points, field: Field | None, now_s: float, scan_time_s: float = 0.0
     ) -> None:
         """Takes what a scan shows. `field` None: it looks everywhere. Raises KeyError for another topic."""
-        self._scanners[topic].take(points, field, scan_time_s, now_s)
+        self._scanners[topic].accept_points(points, field, scan_time_s, now_s)
 
     def on_laser_scan(self, topic: str, scan: Scan, placement: Placement, now_s: float, wall_s: float) -> None:
         """Takes a scan as it came at `now_s` [s, monotonic], `wall_s` by this computer's clock; drops and counts one
@@ -227,7 +229,7 @@ class SafetyFilter:
         """Takes the publishers on the topic of a scanner: a node's name and a key for each. Raises KeyError for another
         topic.
         """
-        self._scanners[topic].sole.look(nodes, keys, now_s)
+        self._scanners[topic].sole.check_publishers(nodes, keys, now_s)
 
     def on_unplaced_scan(self, topic: str, problem: str) -> None:
         """A scan came whose scanner cannot be placed. Raises KeyError for another topic."""
@@ -316,11 +318,11 @@ class SafetyFilter:
 
     def _watch_scans(self, inputs: Inputs, decision: Decision, now_s: float) -> None:
         """Also while something else stops the base: a command that is late for a moment does not begin it anew."""
-        found = missing_scan(inputs) or decision
-        missing = found.action is Action.STOP and found.cause in NO_SCAN
+        held = missing_scan(inputs) or decision
+        missing = held.action is Action.STOP and held.cause in NO_SCAN
         self._no_scan_from = min(self._no_scan_from, now_s) if missing else math.inf
         long = now_s - self._no_scan_from >= WITHOUT_SCANS_S
-        self.without_scans = f"no usable scan for {WITHOUT_SCANS_S:.1f} s: {found.cause.value}" if long else ""
+        self.without_scans = f"no usable scan for {WITHOUT_SCANS_S:.1f} s: {held.cause.value}" if long else ""
 
     def _ordered(self, decision: Decision, now_s: float) -> Decision:
         self._motion.order(decision.twist, now_s)

@@ -57,7 +57,7 @@ class FrozenWatch:
         before, self._stamp_ns = self._stamp_ns, scan.stamp_ns
         return scan.stamp_ns is not None and scan.stamp_ns == before
 
-    def look(self, scan: Scan, now_s: float, *, moves: bool) -> str:
+    def check_scan(self, scan: Scan, now_s: float, *, moves: bool) -> str:
         """Why the scanner counts as frozen, empty: it does not. `moves`: the base may have moved since the last one."""
         ranges = np.asarray(scan.ranges_m, dtype=np.float64)
         in_range = int(np.count_nonzero((ranges >= scan.range_min_m) & (ranges <= scan.range_max_m)))

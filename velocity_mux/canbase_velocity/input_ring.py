@@ -69,7 +69,7 @@ class InputRing:
         if entry[0] == "scan":
             self._scan_bytes += _size(entry)
 
-    def look(self, mux: Mux, safety: SafetyFilter, now_s: float) -> None:
+    def keep_recent(self, mux: Mux, safety: SafetyFilter, now_s: float) -> None:
         """Now and then: forgets what is old, and keeps the state."""
         if now_s >= self._state_at_s + CHECKPOINT_S:
             self._state_at_s = now_s
@@ -108,7 +108,7 @@ class StopWatch:
         self._latched = self._held = True  # what was there at the start is no new stop
         self.open: Stop | None = None
 
-    def look(self, driver: DriverState, estop_free: bool, now_s: float) -> Stop | None:
+    def due_stop(self, driver: DriverState, estop_free: bool, now_s: float) -> Stop | None:
         """The stop whose file is due now."""
         latched = driver is DriverState.LATCHED
         if self.open is None and ((latched and not self._latched) or (not estop_free and not self._held)):

@@ -78,7 +78,7 @@ def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Call
     try:
         while not received:
             executor.spin_once(timeout_sec=WAKE_S)
-            recorder.look(time.monotonic())
+            recorder.record_due_stop(time.monotonic())
             service.alive(safety.state_text, time.monotonic())
         service.stopping()
         patience_s = time.monotonic() + standstill_s(robot)

@@ -59,12 +59,12 @@ def scan_of(message: LaserScan) -> Scan:
 
 def transforms_of(message: TFMessage) -> dict[str, Transform]:
     """The transforms of a message on tf_static, by their child frame. A leading / is of the old tf, and left out."""
-    found = {}
+    placed = {}
     for each in message.transforms:
         at, turn = each.transform.translation, each.transform.rotation
         parent = each.header.frame_id.lstrip("/")
-        found[each.child_frame_id.lstrip("/")] = Transform(parent, at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
-    return found
+        placed[each.child_frame_id.lstrip("/")] = Transform(parent, at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+    return placed
 
 
 def safety_state(decision: Decision, inputs: Inputs, free: Clearances | None, stamp: Time) -> SafetyState:

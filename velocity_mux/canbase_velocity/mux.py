@@ -123,12 +123,12 @@ class _Source:
         self._delay = Delay(config.same_clock)
         self._late_from = math.inf
 
-    def take(self, twist: Twist, received: float, sent: Sent | None, now_s: float) -> None:
+    def accept_command(self, twist: Twist, received: float, sent: Sent | None, now_s: float) -> None:
         """A finite command."""
         self.received += 1
         self.refusal = ""
         self.command = Received(twist, received)
-        self.delay_s = None if sent is None else self._delay.take(sent)
+        self.delay_s = None if sent is None else self._delay.measure(sent)
         if sent is not None and self._delay.set_back:
             self.arming.disarm("a command arrived after a newer one, or the clock of its sender was set back")
         self._late_from = min(self._late_from, now_s) if self.is_late else math.inf
@@ -220,7 +220,7 @@ class Mux:
         self._without_scans = ""
         self._looked_at = -math.inf
 
-    def on_command(
+    def accept_command(
         self, name: str, twist: Twist, received: float, now_s: float | None = None, sent: Sent | None = None
     ) -> bool:
         """Takes the command of source `name`; False: refused, for NaN or infinity. Raises KeyError for another name.
@@ -230,12 +230,12 @@ class Mux:
         """
         now_s = received if now_s is None else now_s
         source = self._sources[name]
-        self._look(now_s)
+        self._advance(now_s)
         if not twist.is_finite:
             self.refuse(name, NOT_FINITE)
             return False
-        source.take(twist, received, sent, now_s)
-        self._look(now_s)
+        source.accept_command(twist, received, sent, now_s)
+        self._advance(now_s)
         return True
 
     def refuse(self, name: str, why: str) -> None:
@@ -265,7 +265,7 @@ class Mux:
     def on_lock(self, name: str, locked: bool, now_s: float) -> None:
         """Takes the word of lock `name`. Raises KeyError for another name."""
         self._locks[name].hear(locked, now_s)
-        self._look(now_s)
+        self._advance(now_s)
 
     def on_publishers(self, topic: str, nodes: Sequence[str], keys: Sequence[str] = ()) -> None:
         """Takes the publishers on this topic of robot.yaml: a node's name for each publisher of the subscribed type,
@@ -283,7 +283,7 @@ class Mux:
 
     def decide(self, now_s: float) -> MuxDecision:
         """The order at time `now_s` [s, monotonic]."""
-        self._look(now_s)
+        self._advance(now_s)
         held = {name: self._held_back(source, now_s) for name, source in self._sources.items()}
         active = next((s for s in self._sources.values() if s.is_fresh(now_s) and not held[s.name]), None)
         views = tuple(self._view(source, active, held[source.name], now_s) for source in self._sources.values())
@@ -303,7 +303,7 @@ class Mux:
         views = tuple(source.view(now_s, SourceStanding.SHUTDOWN, "shutdown") for source in self._sources.values())
         return MuxDecision(None, ZERO, views, *self._others(now_s))
 
-    def _look(self, now_s: float) -> None:
+    def _advance(self, now_s: float) -> None:
         """Time has passed: whom that arms or disarms."""
         if now_s - self._looked_at > BLIND_S:
             for source in self._sources.values():
@@ -315,7 +315,7 @@ class Mux:
         for source in self._sources.values():
             paused = self._held_back(source, now_s) or self._without_scans
             silent = not source.is_fresh(now_s) and not source.crowd
-            source.arming.look(not_ready, now_s, silent=silent, paused=paused)
+            source.arming.advance(not_ready, now_s, silent=silent, paused=paused)
 
     def _others(self, now_s: float) -> tuple[tuple[LockView, ...], tuple[Foreign, ...], bool, str]:
         locks = tuple(lock.view(now_s) for lock in self._locks.values())

@@ -98,7 +98,7 @@ class MuxNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._listen()
         self._timer = steady_timer(self, 1.0 / robot.rates.command_hz, self._tick)
-        steady_timer(self, GRAPH_PERIOD_S, self._look)
+        steady_timer(self, GRAPH_PERIOD_S, self._check_graph)
         steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnose)
 
     @property
@@ -155,12 +155,12 @@ class MuxNode(Node):
 
     def _on_joints(self, name: str, message: JointState) -> None:
         now_s = time.monotonic()
-        found = base_velocity(message, self._robot)
-        if isinstance(found, Refusal):
-            self._mux.refuse(name, found.why)
-            self._log_refusal(name, found.why)
+        velocity = base_velocity(message, self._robot)
+        if isinstance(velocity, Refusal):
+            self._mux.refuse(name, velocity.why)
+            self._log_refusal(name, velocity.why)
             return
-        twist = Twist(found.linear_mps, found.angular_radps)
+        twist = Twist(velocity.linear_mps, velocity.angular_radps)
         self._on_twist(name, twist, now_s, sent_at(message.header.stamp, time.time(), now_s))
 
     def _log_refusal(self, name: str, why: str) -> None:
@@ -169,7 +169,7 @@ class MuxNode(Node):
     def _on_twist(self, name: str, twist: Twist, now_s: float, sent: Sent | None) -> None:
         received, times = self._receive_times.at(now_s), None if sent is None else (sent.stamp_s, sent.wall_s)
         self._note("command", now_s, name, twist.linear_mps, twist.angular_radps, received, times)
-        if not self._mux.on_command(name, twist, received, now_s, sent):
+        if not self._mux.accept_command(name, twist, received, now_s, sent):
             self._log_refusal(name, NOT_FINITE)
         decision = self._decide(now_s)
         if decision.active == name or decision.active != self._decision.active:
@@ -190,18 +190,18 @@ class MuxNode(Node):
         self._mux.on_lock(name, message.data, received)
         self._send_if_changed(now_s)
 
-    def _look(self) -> None:
+    def _check_graph(self) -> None:
         """Into the ROS graph. What is found there is logged when it comes."""
         now_s = time.monotonic()
         before = self._decision.foreign
         heard_at = {topic: self.resolve_topic_name(topic) for topic in self._heard}
         names = {topic.topic for topic in self._watch.expected} | set(heard_at.values())
         graph = {name: publishers(self, name) for name in names}
-        foreign = self._watch.look(graph, now_s)
+        foreign = self._watch.check_graph(graph, now_s)
         for found in foreign:
             if found not in before:
-                told = {"topic": found.topic, "node": found.node}
-                self._event_log.write(found.sentence, found.priority, robot=self._robot.name, **told)
+                fields = {"topic": found.topic, "node": found.node}
+                self._event_log.write(found.sentence, found.priority, robot=self._robot.name, **fields)
         self._note("foreign", now_s, [asdict(found) for found in foreign])
         self._mux.on_foreign(foreign)
         for topic, kind in self._heard.items():

@@ -52,7 +52,7 @@ class Arming:
         """It needs a zero again. The first reason is kept."""
         self.waits_since = self.waits_since or why
 
-    def look(self, not_ready: str, now_s: float, *, silent: bool, paused: str = "") -> None:
+    def advance(self, not_ready: str, now_s: float, *, silent: bool, paused: str = "") -> None:
         """Time has passed. `not_ready`: why the base cannot move; empty: it can. `silent`: it is not fresh.
 
         `paused`: why this source is not followed although the base is ready; empty: it is.

@@ -79,7 +79,7 @@ class Parameters:
         return limits
 
     def _set(self, parameters: Sequence[Parameter]) -> None:
-        self._take(self._after(parameters), "set by a parameter")
+        self._apply(self._after(parameters), "set by a parameter")
 
     def _on_nav2(self, message: Any) -> None:
         try:
@@ -87,9 +87,9 @@ class Parameters:
         except RefusedLimitError as error:
             self._refused(f"{TOPIC}: {error}")
             return
-        self._take(limits, f"set by Nav2 on {TOPIC}")
+        self._apply(limits, f"set by Nav2 on {TOPIC}")
 
-    def _take(self, limits: SpeedLimits, how: str) -> None:
+    def _apply(self, limits: SpeedLimits, how: str) -> None:
         before, self.limits = self.limits, limits
         if limits.effective != before.effective:
             self._changed(limits, how)

@@ -208,16 +208,18 @@ def _slower(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     command, limits, ceiling = inputs.command, config.limits, config.safety.ceiling
     linear_mps = min(limits.linear_mps, ceiling.linear_mps) if ceiling else limits.linear_mps
     angular_radps = min(limits.angular_radps, ceiling.angular_radps) if ceiling else limits.angular_radps
-    found = [
+    slower = [
         _limit(command, obstacle.speed_factor(command, linear_mps, angular_radps), StopCause.SPEED, "a slower command")
     ]
-    found.append(_lowered(inputs))
+    slower.append(_lowered(inputs))
     if config.uncommissioned:
-        found.append(_corners(command, config.safety.uncommissioned_mps, config, StopCause.SPEED, *_commission(config)))
+        slower.append(
+            _corners(command, config.safety.uncommissioned_mps, config, StopCause.SPEED, *_commission(config))
+        )
     for zone in config.safety.limit_zones:
         factor = coverage.zone_factor(command, zone, inputs.sight, config.geometry)
-        found.append(_limit(command, factor, StopCause.ZONE, "a limit zone that scanners cover, and nothing in it"))
-    return found + _unseen(inputs, config)
+        slower.append(_limit(command, factor, StopCause.ZONE, "a limit zone that scanners cover, and nothing in it"))
+    return slower + _unseen(inputs, config)
 
 
 def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
@@ -225,14 +227,14 @@ def _unseen(inputs: Inputs, config: FilterConfig) -> list[Finding]:
     command, sight, geometry = inputs.command, inputs.sight, config.geometry
     if all(scan.age_s == math.inf and not scan.dropped for scan in inputs.scans):
         return []
-    found, slower = [], command
+    unseen, slower = [], command
     if sight.fields:
         in_range = obstacle.range_share(command, sight, geometry)
         slower = command.scaled(in_range)
         if in_range < 1.0:
-            found.append(_out_of_range(command, in_range, sight, config))
+            unseen.append(_out_of_range(command, in_range, sight, config))
     gap = None if slower.is_zero else coverage.uncovered(slower, sight, geometry)
-    return found if gap is None else [*found, _not_covered(gap, inputs, config)]
+    return unseen if gap is None else [*unseen, _not_covered(gap, inputs, config)]
 
 
 def _not_covered(gap: Gap, inputs: Inputs, config: FilterConfig) -> Finding:
@@ -286,8 +288,8 @@ def _blind(command: Twist, cause: StopCause, why: str, clears_on: str, config: F
 
 def _lowered(inputs: Inputs) -> Finding:
     limit, command = inputs.speed_limit, inputs.command
-    found = _limit(command, limit.share(command), StopCause.SPEED, "a slower command, or a higher speed_limit")
-    return found if found is PASSED else replace(found, detail=f"{inputs.speed_limit_by}: {found.detail}")
+    limited = _limit(command, limit.share(command), StopCause.SPEED, "a slower command, or a higher speed_limit")
+    return limited if limited is PASSED else replace(limited, detail=f"{inputs.speed_limit_by}: {limited.detail}")
 
 
 def _commission(config: FilterConfig) -> tuple[str, str]:
@@ -336,8 +338,8 @@ def _too_late(inputs: Inputs, config: FilterConfig) -> Finding:
     """Why the base brakes hard, to standstill."""
     geometry, where = config.geometry, _where(inputs.moving.twist)
     touch = first_touch(inputs.sight.points, geometry.box, inputs.moving.twist, geometry.stop_m / 2.0)
-    seen = f": {touch.way_m:.2f} m free {where}" if math.isfinite(touch.way_m) else " to standstill"
-    return stop(StopCause.OBSTACLE, f"brakes hard{seen}", "standstill, and more free way")
+    distance = f": {touch.way_m:.2f} m free {where}" if math.isfinite(touch.way_m) else " to standstill"
+    return stop(StopCause.OBSTACLE, f"brakes hard{distance}", "standstill, and more free way")
 
 
 def _obstacle(twist: Twist, inputs: Inputs, config: FilterConfig) -> Finding:

@@ -29,7 +29,7 @@ class SolePublisher:
         self.problem = ""
         """Why no scan counts; empty: there is no reason."""
 
-    def look(self, nodes: Sequence[str], keys: Sequence[str], now_s: float) -> None:
+    def check_publishers(self, nodes: Sequence[str], keys: Sequence[str], now_s: float) -> None:
         """Takes the publishers there at `now_s` [s, monotonic]: of each one its node's name, and what distinguishes it
         from a later one of the same name."""
         if self._latched:

@@ -14,7 +14,7 @@ from canbase_velocity.mux_node import MuxNode
 
 
 class StopRecorder:
-    """`look` is called in each turn of the executor's thread; another thread writes."""
+    """`record_due_stop` is called in each turn of the executor's thread; another thread writes."""
 
     def __init__(self, robot: Robot, inputs: InputRing, mux: MuxNode, safety: FilterNode) -> None:
         self._robot, self._inputs, self._mux, self._safety = robot, inputs, mux, safety
@@ -27,10 +27,10 @@ class StopRecorder:
         """The thread that writes."""
         self._files.start()
 
-    def look(self, now_s: float) -> None:
+    def record_due_stop(self, now_s: float) -> None:
         """Keeps the state now and then; hands over what is due."""
-        self._inputs.look(self._mux.core, self._safety.core, now_s)
-        due = self._watch.look(self._mux.core.driver_state(now_s), self._safety.estop_free, now_s)
+        self._inputs.keep_recent(self._mux.core, self._safety.core, now_s)
+        due = self._watch.due_stop(self._mux.core.driver_state(now_s), self._safety.estop_free, now_s)
         if due is not None:
             self._hand_over(due, time.time() - now_s)
 

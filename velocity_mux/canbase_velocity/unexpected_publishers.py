@@ -87,7 +87,7 @@ class ForeignWatch:
         self.expected = tuple(expected)
         self._unknown_since: dict[str, float] = {}
 
-    def look(self, graph: Mapping[str, Sequence[Publisher]], now_s: float) -> tuple[Foreign, ...]:
+    def check_graph(self, graph: Mapping[str, Sequence[Publisher]], now_s: float) -> tuple[Foreign, ...]:
         """All foreign publishers among those in the graph, by topic, at time `now_s` [s, monotonic]."""
         unknown = {topic for topic, publishers in graph.items() if any(not p.node for p in publishers)}
         self._unknown_since = {topic: self._unknown_since.get(topic, now_s) for topic in sorted(unknown)}
@@ -98,15 +98,15 @@ class ForeignWatch:
     def _on(self, expected: Expected, publishers: Sequence[Publisher], now_s: float) -> list[Foreign]:
         patient = now_s - self._unknown_since.get(expected.topic, now_s) < PATIENCE_S
         counts = Counter(publisher.node for publisher in publishers if publisher.kind == expected.kind)
-        found = []
+        foreign = []
         for node, kind in sorted({(publisher.node, publisher.kind) for publisher in publishers}):
             problem = _problem(node, kind, expected, counts[node])
             if problem and (node or not patient):
                 obeyed = kind == expected.kind and expected.obeyed
-                found.append(
+                foreign.append(
                     Foreign(expected.topic, node or UNKNOWN, kind, problem, expected.source, obeyed, expected.shown)
                 )
-        return found
+        return foreign
 
 
 def _problem(node: str, kind: str, expected: Expected, count: int) -> str:

@@ -275,7 +275,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "filter:estop": _put(filter_state.SafetyFilter, "_advance_estop", _no_estop),
     "filter:obstacle": _put(obstacle, "first_touch", lambda points, box, twist, stop_m: NO_TOUCH),
     "filter:blind": _put(coverage, "uncovered", lambda order, sight, geometry: None),
-    "filter:frozen": _put(FrozenWatch, "look", _never_frozen),
+    "filter:frozen": _put(FrozenWatch, "check_scan", _never_frozen),
     "filter:repeated_stamp": _put(FrozenWatch, "is_repeated", lambda self, scan: False),
     "filter:late_scans": _put(filter_state._Scanner, "_late_s", lambda self, scan, now_s, wall_s: 0.0),
     "filter:command": _put(safety_filter, "_command", lambda inputs, config: None),

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.goal_queue import GoalQueue
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
-from canbase_action_server.outcome import Outcome
+from canbase_action_server.outcome import GoalOutcome
 from canbase_campaign.clock import ComputerClock
 from canbase_campaign.process import Process, Topics
 from canbase_config.robot import Robot
@@ -28,7 +28,7 @@ class Goal:
     distance_m: float
     speed_mps: float
     began: float
-    ends: list[Outcome]
+    ends: list[GoalOutcome]
     ended_at: float = 0.0
     died: bool = False
     """Its server was killed."""
@@ -111,7 +111,7 @@ class ActionProcess(Process):
             self._on_end(goal)
 
     def _on_odometry(self, snapshot: DriverSnapshot) -> None:
-        pose = Pose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
+        pose = BasePose(snapshot.odometry.pose.x_m, snapshot.odometry.pose.y_m, snapshot.odometry.pose.yaw_rad)
         twist, now_s = snapshot.odometry.twist, self.clock.now_s
         odometry = Odometry(now_s, pose, twist.linear_mps, twist.angular_radps)
         self._inputs = replace(self._inputs, odometry=Received(odometry, now_s))

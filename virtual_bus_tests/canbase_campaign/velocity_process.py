@@ -109,7 +109,7 @@ class VelocityProcess(Process):
         stamp_s = now_s - self.clocks_behind[name](now_s) if name in self.clocks_behind else None
         times = None if stamp_s is None else (stamp_s, now_s)
         self.note("command", now_s, name, twist.linear_mps, twist.angular_radps, now_s, times)
-        self.mux.on_command(name, twist, now_s, sent=None if stamp_s is None else Sent(stamp_s, now_s, now_s))
+        self.mux.accept_command(name, twist, now_s, sent=None if stamp_s is None else Sent(stamp_s, now_s, now_s))
         decision = self._decide()
         if decision.active == name or decision.active != self._active:
             self._send(decision)
@@ -133,7 +133,7 @@ class VelocityProcess(Process):
         self._topics.publish("cmd_vel_mux", decision.twist)
         if not self._topics.loses("cmd_vel_mux"):
             self.note("obey", now_s, now_s)
-            self.filter.on_command(decision.twist, now_s)
+            self.filter.accept_command(decision.twist, now_s)
             self._issue(self._filter_decides(now_s))
         told = decision.essence
         if told != self._mux_told or now_s - self._mux_state_at >= STATE_PERIOD_S:

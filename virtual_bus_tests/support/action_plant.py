@@ -9,12 +9,12 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.goal import GoalRun
 from canbase_action_server.goal_request import DriveRequest, Request, RotateRequest
 from canbase_action_server.inputs import Driver, Inputs, Mux, Odometry, Safety
-from canbase_action_server.motion import STOP, Twist
-from canbase_action_server.outcome import Outcome
+from canbase_action_server.motion import STOP, BaseTwist
+from canbase_action_server.outcome import GoalOutcome
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
@@ -52,9 +52,9 @@ class Plant:
     stuck: bool = False
     _ramped_mps: float = 0.0
     _ramped_radps: float = 0.0
-    _pipe: deque[tuple[float, Twist]] = field(default_factory=lambda: deque([(-1.0, STOP)]))
+    _pipe: deque[tuple[float, BaseTwist]] = field(default_factory=lambda: deque([(-1.0, STOP)]))
 
-    def order(self, twist: Twist, now_s: float) -> None:
+    def order(self, twist: BaseTwist, now_s: float) -> None:
         """A velocity order enters the chain."""
         self._pipe.append((now_s + self.dead_time_s, twist))
 
@@ -82,7 +82,7 @@ class Plant:
         """The odometry, in whole encoder counts."""
         x, y = (COUNT_M * round(value / COUNT_M) for value in (self.x_m, self.y_m))
         yaw_rad = math.remainder(self.yaw_rad, 2.0 * math.pi)
-        return Odometry(received, Pose(x, y, yaw_rad), self.speed_mps, self.turn_radps)
+        return Odometry(received, BasePose(x, y, yaw_rad), self.speed_mps, self.turn_radps)
 
 
 GOOD_SAFETY = Safety(stops=False, cause=StopCause.NONE, detail="", estop=False)
@@ -123,9 +123,9 @@ class Story:
     fastest_radps: float = 0.0
     now_s: float = 0.0
     ended_at: float = 0.0
-    orders: list[tuple[float, Twist]] = field(default_factory=list)
+    orders: list[tuple[float, BaseTwist]] = field(default_factory=list)
 
-    def run(self, limit_s: float = 120.0) -> Outcome:
+    def run(self, limit_s: float = 120.0) -> GoalOutcome:
         """From the acceptance to the outcome, then half a second more to see whether something still moves."""
         self.inputs = replaced(self.inputs, 0.0, odometry=self.plant.odometry(0.0))
         start = self.plant.odometry(0.0)

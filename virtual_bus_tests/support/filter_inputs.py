@@ -98,7 +98,7 @@ CEILING = Ceiling(linear_mps=0.6, angular_radps=1.0, acceleration_mps2=0.5, angu
 def fed(now_s: float, twist: Twist, *, pressed: bool = False, the_filter: SafetyFilter | None = None) -> SafetyFilter:
     """A filter that has just received everything it needs."""
     made = the_filter or SafetyFilter(config())
-    made.on_command(twist, now_s)
+    made.accept_command(twist, now_s)
     see(made, now_s)
     made.on_estop(pressed, now_s)
     return made

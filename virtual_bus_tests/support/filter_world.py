@@ -104,7 +104,7 @@ class FilterWorld:
         if self._step % self._scan_steps == 0:
             self._scan(now_s)
         if self._step % self._command_steps == 0:
-            self.filter.on_command(self.command, now_s)
+            self.filter.accept_command(self.command, now_s)
             self.decision = self.filter.decide(now_s)
             self.emergencies += self.decision.emergency
         assert self.decision is not None

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.goal import Feedback
 from canbase_action_server.goal_queue import Cycle, GoalQueue
 from canbase_action_server.goal_request import DriveRequest, Request
 from canbase_action_server.inputs import Inputs, Odometry
 from canbase_action_server.motion import STOP
-from canbase_action_server.outcome import ErrorCode, Outcome
+from canbase_action_server.outcome import ErrorCode, GoalOutcome
 from canbase_config.robot import Robot
 from support.action_plant import GOOD_DRIVER, bench_robot, good_inputs, replaced, value
 
@@ -36,9 +36,9 @@ class Told:
     admitted: float
     canceled: bool = False
     began: float | None = None
-    ends: list[Outcome] = field(default_factory=list)
+    ends: list[GoalOutcome] = field(default_factory=list)
     ended: float = 0.0
-    began_at: tuple[Pose, float] = (Pose(0.0, 0.0, 0.0), 0.0)
+    began_at: tuple[BasePose, float] = (BasePose(0.0, 0.0, 0.0), 0.0)
     """Where the base was when it began, and how far it had turned since the beginning of the world."""
 
 
@@ -66,9 +66,9 @@ class GoalQueueWorld:
         return self.change(replaced(healthy, self.now_s, driver=driver))
 
     @property
-    def pose(self) -> Pose:
+    def pose(self) -> BasePose:
         """Of the base, truly."""
-        return Pose(self.x_m, self.y_m, math.remainder(self.turned_rad, 2.0 * math.pi))
+        return BasePose(self.x_m, self.y_m, math.remainder(self.turned_rad, 2.0 * math.pi))
 
     def ask(self, request: Request) -> str | None:
         """A client sends a goal: its key, None when it is refused."""

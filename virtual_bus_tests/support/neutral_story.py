@@ -36,7 +36,7 @@ class Story:
                 self._status_due = self.now_s + STATUS_S
                 self.mux.on_driver(self.driver, self.cycles, self.now_s)
             for name, twist in self.sends.items():
-                self.mux.on_command(name, twist, self.now_s)
+                self.mux.accept_command(name, twist, self.now_s)
             decision = self.decide()
         return decision
 

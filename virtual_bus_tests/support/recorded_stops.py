@@ -131,8 +131,10 @@ class VelocityBox:
     def _look(self) -> None:
         velocity, now_s = self._world.velocity, self._world.clock.now_s
         if velocity.running:
-            self._ring.look(velocity.mux, velocity.filter, now_s)
-            due = self._watch.look(velocity.mux.driver_state(now_s), velocity.filter.estop is EstopState.FREE, now_s)
+            self._ring.keep_recent(velocity.mux, velocity.filter, now_s)
+            due = self._watch.due_stop(
+                velocity.mux.driver_state(now_s), velocity.filter.estop is EstopState.FREE, now_s
+            )
             if due is not None:
                 self._cut(due)
         self._world.clock.after(self.LOOK_S, self._look)

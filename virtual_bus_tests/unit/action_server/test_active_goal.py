@@ -9,7 +9,7 @@ import pytest
 from canbase_action_server.active_goal import FAREWELL_S, ActiveGoal
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Inputs
-from canbase_action_server.motion import Twist
+from canbase_action_server.motion import BaseTwist
 from canbase_action_server.outcome import ErrorCode
 from support.action_plant import Plant, bench_robot, good_inputs
 
@@ -24,9 +24,9 @@ def good(now_s: float) -> Inputs:
 def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
     owner = ActiveGoal(bench_robot())
     assert owner.tick(good(0.0), 0.0) is None  # nobody drives: silence
-    owner.take(REQUEST, good(0.0), 0.0)
+    owner.start(REQUEST, good(0.0), 0.0)
     with pytest.raises(RuntimeError, match="not free"):
-        owner.take(REQUEST, good(0.0), 0.0)
+        owner.start(REQUEST, good(0.0), 0.0)
     now_s = 0.0
     while owner.busy:
         now_s += 0.02
@@ -35,19 +35,19 @@ def test_the_base_has_one_owner_and_is_free_again_after_it() -> None:
     assert order.end is not None
     farewell, silence = owner.tick(good(now_s), now_s + 0.1), owner.tick(good(now_s), now_s + FAREWELL_S + 0.01)
     assert farewell is not None
-    assert (farewell.twist, farewell.end) == (Twist(), None)
+    assert (farewell.twist, farewell.end) == (BaseTwist(), None)
     assert silence is None
-    owner.take(REQUEST, good(now_s), now_s)
+    owner.start(REQUEST, good(now_s), now_s)
 
 
 def test_a_base_that_was_never_seen_is_not_taken() -> None:
     with pytest.raises(RuntimeError, match="odometry"):
-        ActiveGoal(bench_robot()).take(REQUEST, Inputs(), 0.0)
+        ActiveGoal(bench_robot()).start(REQUEST, Inputs(), 0.0)
 
 
 def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
     owner = ActiveGoal(bench_robot())
-    owner.take(REQUEST, good(0.0), 0.0)
+    owner.start(REQUEST, good(0.0), 0.0)
     owner.fail(ZeroDivisionError("a defect"), 0.0)
     owner.fail(ValueError("a second one, which changes nothing"), 0.1)
     now_s, twists, end = 0.0, set(), None
@@ -57,7 +57,7 @@ def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
         assert order is not None
         twists.add(order.twist)
         end = order.end
-    assert twists == {Twist()}
+    assert twists == {BaseTwist()}
     assert end.code is ErrorCode.INTERNAL
     assert "ZeroDivisionError('a defect')" in end.message
 
@@ -65,9 +65,9 @@ def test_after_a_defect_the_goal_only_stops_and_ends_as_internal() -> None:
 def test_a_process_out_of_time_ends_its_goal_at_once() -> None:
     owner = ActiveGoal(bench_robot())
     assert owner.give_up(ErrorCode.SHUTDOWN, "no time", 0.0) is None
-    owner.take(REQUEST, good(0.0), 0.0)
+    owner.start(REQUEST, good(0.0), 0.0)
     order = owner.give_up(ErrorCode.SHUTDOWN, "no time", 0.1)
     assert order is not None
     assert order.end is not None
-    assert (order.twist, order.end.code) == (Twist(), ErrorCode.SHUTDOWN)
+    assert (order.twist, order.end.code) == (BaseTwist(), ErrorCode.SHUTDOWN)
     assert not owner.busy

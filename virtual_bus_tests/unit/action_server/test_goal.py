@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.goal import GoalPhase
 from canbase_action_server.goal_request import DriveRequest
 from canbase_action_server.inputs import Mux, Odometry, Safety
-from canbase_action_server.motion import Twist
+from canbase_action_server.motion import BaseTwist
 from canbase_action_server.outcome import ErrorCode, Status
 from canbase_config.stopping import standstill_s
 from canbase_runtime.driver_state import DriverState
@@ -53,7 +53,7 @@ def lose_driver(story: Story) -> None:
 
 
 def zero_from(story: Story, start_s: float) -> bool:
-    return all(twist == Twist() for at_s, twist in story.orders if at_s >= start_s)
+    return all(twist == BaseTwist() for at_s, twist in story.orders if at_s >= start_s)
 
 
 def test_a_cancel_at_full_speed_ends_after_the_ramp_and_not_before() -> None:
@@ -134,7 +134,7 @@ def test_a_server_that_stood_still_does_not_drive_on_with_what_arrives_then() ->
     for tick in range(51):
         goal.tick(good_inputs(plant.odometry(tick * 0.02)), tick * 0.02)
     order = goal.tick(good_inputs(plant.odometry(3.0)), 3.0)
-    assert order.twist == Twist()
+    assert order.twist == BaseTwist()
     assert goal.phase is GoalPhase.STOPPING
 
 
@@ -264,8 +264,8 @@ def test_a_base_that_ends_beside_its_line_is_no_success() -> None:
     (0.0, 0.199, False), (0.0, 0.201, True), (0.0, -0.199, False), (0.0, -0.201, True),
 ])  # fmt: skip
 def test_the_tolerances_of_the_course_are_those_of_robot_yaml(lateral_m: float, heading_rad: float, ends: bool) -> None:
-    motion = DriveRequest(1.0, 0.2).motion(bench_robot(), Odometry(0.0, Pose(0.0, 0.0, 0.0), 0.0, 0.0))
-    assert motion.observe(Odometry(0.02, Pose(0.05, lateral_m, heading_rad), 0.2, 0.0))
+    motion = DriveRequest(1.0, 0.2).motion(bench_robot(), Odometry(0.0, BasePose(0.0, 0.0, 0.0), 0.0, 0.0))
+    assert motion.observe(Odometry(0.02, BasePose(0.05, lateral_m, heading_rad), 0.2, 0.0))
     assert bool(motion.strayed(0.05, 0.2)) is ends
 
 

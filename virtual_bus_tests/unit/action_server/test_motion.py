@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.inputs import Odometry
 from canbase_action_server.motion_limits import profile_limits
 from canbase_action_server.straight import STEERING_RADPM, StraightMotion
 from support.action_plant import Plant, bench_robot
 
 LIMITS = profile_limits(bench_robot(), 0.4)
-START = Odometry(0.0, Pose(0.0, 0.0, 0.0), 0.0, 0.0)
+START = Odometry(0.0, BasePose(0.0, 0.0, 0.0), 0.0, 0.0)
 
 
-def steering(distance_m: float, at: Pose) -> tuple[float, float]:
+def steering(distance_m: float, at: BasePose) -> tuple[float, float]:
     """Orders when the base is at `at` a second after the start, up to speed: linear [m/s], angular [rad/s]."""
     motion = StraightMotion(START, distance_m, LIMITS)
     for cycle in range(51):
@@ -29,37 +29,37 @@ def steering(distance_m: float, at: Pose) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("distance_m", "at", "linear_mps", "angular_radps"),
     [
-        (3.0, Pose(0.0, 0.0, 0.0), 0.4, 0.0),
-        (-3.0, Pose(0.0, 0.0, 0.0), -0.4, 0.0),
-        (3.0, Pose(0.0, 0.0, 0.1), 0.4, -0.15),  # 1.5 /s × 0.1 rad, the same way in both directions
-        (-3.0, Pose(0.0, 0.0, 0.1), -0.4, -0.15),
-        (3.0, Pose(0.0, 0.05, 0.0), 0.4, -0.08),  # 4 /m × 0.4 m/s × 0.05 m
-        (-3.0, Pose(0.0, 0.05, 0.0), -0.4, 0.08),  # driving backward, turning left leads right
-        (3.0, Pose(0.0, 0.0, 1.0), 0.4, -STEERING_RADPM * 0.4),  # bounded by the curvature
-        (3.0, Pose(0.0, 0.0, -1.0), 0.4, STEERING_RADPM * 0.4),
+        (3.0, BasePose(0.0, 0.0, 0.0), 0.4, 0.0),
+        (-3.0, BasePose(0.0, 0.0, 0.0), -0.4, 0.0),
+        (3.0, BasePose(0.0, 0.0, 0.1), 0.4, -0.15),  # 1.5 /s × 0.1 rad, the same way in both directions
+        (-3.0, BasePose(0.0, 0.0, 0.1), -0.4, -0.15),
+        (3.0, BasePose(0.0, 0.05, 0.0), 0.4, -0.08),  # 4 /m × 0.4 m/s × 0.05 m
+        (-3.0, BasePose(0.0, 0.05, 0.0), -0.4, 0.08),  # driving backward, turning left leads right
+        (3.0, BasePose(0.0, 0.0, 1.0), 0.4, -STEERING_RADPM * 0.4),  # bounded by the curvature
+        (3.0, BasePose(0.0, 0.0, -1.0), 0.4, STEERING_RADPM * 0.4),
     ],
 )
-def test_it_steers_back_to_the_line(distance_m: float, at: Pose, linear_mps: float, angular_radps: float) -> None:
+def test_it_steers_back_to_the_line(distance_m: float, at: BasePose, linear_mps: float, angular_radps: float) -> None:
     seen = steering(distance_m, at)
     assert seen == pytest.approx((linear_mps, angular_radps), abs=0.002)
 
 
 def test_a_backward_way_counts_down_and_can_be_overshot() -> None:
     motion = StraightMotion(START, -0.5, LIMITS)
-    assert motion.observe(replace(START, received=1.0, pose=Pose(-0.2, 0.01, 0.0)))
+    assert motion.observe(replace(START, received=1.0, pose=BasePose(-0.2, 0.01, 0.0)))
     assert (motion.traveled_m, motion.lateral_m) == (-0.2, 0.01)
     assert motion.remaining_m == pytest.approx(0.3)
-    assert motion.observe(replace(START, received=2.0, pose=Pose(-0.503, 0.0, 0.0)))
+    assert motion.observe(replace(START, received=2.0, pose=BasePose(-0.503, 0.0, 0.0)))
     assert motion.remaining_m == pytest.approx(-0.003)
-    assert motion.observe(replace(START, received=3.0, pose=Pose(-0.5, 0.0, 0.0)))
+    assert motion.observe(replace(START, received=3.0, pose=BasePose(-0.5, 0.0, 0.0)))
     assert motion.overshoot_m == pytest.approx(0.003)
 
 
 def test_a_pose_that_jumped_is_not_taken_in() -> None:
     # 0.1 s at 0.4 m/s: twice that, plus 0.1 m, is 0.18 m.
     motion = StraightMotion(START, 3.0, LIMITS)
-    assert motion.observe(replace(START, received=0.1, pose=Pose(0.17, 0.0, 0.0)))
-    assert not motion.observe(replace(START, received=0.2, pose=Pose(0.17 + 0.19, 0.0, 0.0)))
+    assert motion.observe(replace(START, received=0.1, pose=BasePose(0.17, 0.0, 0.0)))
+    assert not motion.observe(replace(START, received=0.2, pose=BasePose(0.17 + 0.19, 0.0, 0.0)))
     assert motion.traveled_m == 0.17
 
 

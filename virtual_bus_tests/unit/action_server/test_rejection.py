@@ -31,7 +31,7 @@ def test_the_reason_of_the_same_numbers_is_the_goals(goal: dict[str, float]) -> 
     reasons = Reasons()
     reasons.expect(goal)
     assert reasons.found is None
-    reasons.take(published(goal), "too far")
+    reasons.take_rejection(published(goal), "too far")
     assert reasons.found == "too far"
 
 
@@ -49,7 +49,7 @@ def test_the_reason_of_the_same_numbers_is_the_goals(goal: dict[str, float]) -> 
 def test_the_reason_of_other_numbers_is_not(other: dict[str, float]) -> None:
     reasons = Reasons()
     reasons.expect(ONE_METRE)
-    reasons.take(published(other), "of another client")
+    reasons.take_rejection(published(other), "of another client")
     assert reasons.found is None
 
 
@@ -57,7 +57,7 @@ def test_the_reason_of_other_numbers_is_not(other: dict[str, float]) -> None:
 def test_a_number_too_large_for_the_interface_arrives_as_infinite(sent: float, received: str) -> None:
     reasons = Reasons()
     reasons.expect(drive(sent, 0.2))
-    reasons.take([("distance_m", received), ("max_speed_mps", "0.2")], "not finite")
+    reasons.take_rejection([("distance_m", received), ("max_speed_mps", "0.2")], "not finite")
     assert reasons.found == "not finite"
 
 
@@ -65,16 +65,16 @@ def test_a_number_too_large_for_the_interface_arrives_as_infinite(sent: float, r
 def test_what_cannot_be_read_is_dropped(text: str) -> None:
     reasons = Reasons()
     reasons.expect(ONE_METRE)
-    reasons.take([("distance_m", text), ("max_speed_mps", "0.2")], "from elsewhere")
+    reasons.take_rejection([("distance_m", text), ("max_speed_mps", "0.2")], "from elsewhere")
     assert reasons.found is None
 
 
 def test_what_came_before_the_goal_was_sent_is_about_another() -> None:
     reasons = Reasons()
-    reasons.take(published(ONE_METRE), "before any goal")
+    reasons.take_rejection(published(ONE_METRE), "before any goal")
     reasons.expect(ONE_METRE)
     assert reasons.found is None
-    reasons.take(published(ONE_METRE), "busy")
+    reasons.take_rejection(published(ONE_METRE), "busy")
     reasons.expect(ONE_METRE)
     assert reasons.found is None
 
@@ -82,10 +82,10 @@ def test_what_came_before_the_goal_was_sent_is_about_another() -> None:
 def test_the_first_reason_counts_and_an_empty_one_is_none() -> None:
     reasons = Reasons()
     reasons.expect(ONE_METRE)
-    reasons.take(published(ONE_METRE), "")
+    reasons.take_rejection(published(ONE_METRE), "")
     assert reasons.found is None
-    reasons.take(published(ONE_METRE), "busy")
-    reasons.take(published(ONE_METRE), "emergency stop")
+    reasons.take_rejection(published(ONE_METRE), "busy")
+    reasons.take_rejection(published(ONE_METRE), "emergency stop")
     assert reasons.found == "busy"
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.goal_request import RotateRequest
 from canbase_action_server.inputs import Odometry
 from canbase_action_server.motion_limits import lever_m, turn_limits
@@ -21,7 +21,7 @@ from support.goal_queue_world import GoalQueueWorld, robot_with
 
 ROBOT = bench_robot()  # action.*: 0.02 to 63 rad, 0.1 to 1.5 rad/s; the wheels are 0.25 m from the middle
 LEVER_M = 0.25
-START = Odometry(0.0, Pose(0.0, 0.0, 3.0), 0.0, 0.0)
+START = Odometry(0.0, BasePose(0.0, 0.0, 3.0), 0.0, 0.0)
 TOLERANCE_M = 0.005
 
 
@@ -29,7 +29,7 @@ def turning(angle_rad: float, *yaws: float) -> TurnMotion:
     """After these headings, 0.1 s apart."""
     motion = TurnMotion(START, angle_rad, LEVER_M, turn_limits(ROBOT, 1.5))
     for index, yaw_rad in enumerate(yaws):
-        assert motion.observe(replace(START, received=0.1 * (index + 1), pose=Pose(0.0, 0.0, yaw_rad)))
+        assert motion.observe(replace(START, received=0.1 * (index + 1), pose=BasePose(0.0, 0.0, yaw_rad)))
     return motion
 
 
@@ -52,8 +52,8 @@ def test_the_order_turns_and_never_drives() -> None:
     assert min(order.angular_radps for order in orders if order) == pytest.approx(-1.5, abs=0.01)
 
 
-@pytest.mark.parametrize("pose", [Pose(0.0, 0.0, 1.0), Pose(0.3, 0.0, 3.0)])
-def test_a_pose_that_jumped_is_not_taken_in(pose: Pose) -> None:
+@pytest.mark.parametrize("pose", [BasePose(0.0, 0.0, 1.0), BasePose(0.3, 0.0, 3.0)])
+def test_a_pose_that_jumped_is_not_taken_in(pose: BasePose) -> None:
     motion = turning(3.0)
     assert not motion.observe(replace(START, received=0.02, pose=pose))
     assert motion.traveled_m == 0.0
@@ -117,14 +117,14 @@ def test_the_lever_is_half_the_track() -> None:
 
 @pytest.mark.parametrize(("angle_rad", "slow"), [(2.0, "left"), (-2.0, "left"), (2.0, "right"), (-2.0, "right")])
 def test_a_base_that_swings_about_one_wheel_drifts_away_and_the_wheel_is_named(angle_rad: float, slow: str) -> None:
-    motion = TurnMotion(Odometry(0.0, Pose(1.0, 2.0, 0.7), 0.0, 0.0), angle_rad, 0.2, turn_limits(ROBOT, 1.5))
+    motion = TurnMotion(Odometry(0.0, BasePose(1.0, 2.0, 0.7), 0.0, 0.0), angle_rad, 0.2, turn_limits(ROBOT, 1.5))
     side_m = 0.2 if slow == "left" else -0.2  # the wheel that stands, in the frame of the base
     for share in (0.03, 0.06, 0.09, 0.12, 0.15):
         turned = share * angle_rad
         along_m, lateral_m = side_m * math.sin(turned), side_m * (1.0 - math.cos(turned))
         x_m = 1.0 + along_m * math.cos(0.7) - lateral_m * math.sin(0.7)
         y_m = 2.0 + along_m * math.sin(0.7) + lateral_m * math.cos(0.7)
-        assert motion.observe(Odometry(10.0 * share, Pose(x_m, y_m, 0.7 + turned), 0.0, 0.0))
+        assert motion.observe(Odometry(10.0 * share, BasePose(x_m, y_m, 0.7 + turned), 0.0, 0.0))
         assert bool(motion.strayed(0.05, 0.2)) is (0.4 * abs(math.sin(turned / 2.0)) > 0.05)
     assert f"does the {slow} wheel turn as ordered?" in motion.strayed(0.05, 0.2)
 

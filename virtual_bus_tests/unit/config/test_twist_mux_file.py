@@ -165,11 +165,11 @@ def test_equal_priorities_are_accepted_by_a_key_and_the_first_by_name_is_active(
     reordered = ORIGINAL.replace("joystick", "zjoystick")
     for text, first, second in ((ORIGINAL, "joystick", "tablet"), (reordered, "tablet", "zjoystick")):
         mux = rested(mux_of(tmp_path, text, also="  equal_priorities: by_name\n").sources)
-        mux.on_command(second, Twist(0.2, 0.0), 1.0)
+        mux.accept_command(second, Twist(0.2, 0.0), 1.0)
         assert mux.decide(1.0).active == second
-        mux.on_command(first, Twist(0.1, 0.0), 1.0)
+        mux.accept_command(first, Twist(0.1, 0.0), 1.0)
         assert (mux.decide(1.0).active, mux.decide(1.0).twist.linear_mps) == (first, 0.1)
-        mux.on_command(second, Twist(0.2, 0.0), 1.6)  # the first one is silent for more than its 0.5 s
+        mux.accept_command(second, Twist(0.2, 0.0), 1.6)  # the first one is silent for more than its 0.5 s
         assert mux.decide(1.6).active == second
 
 
@@ -181,10 +181,10 @@ def test_a_topic_without_timeout_gets_that_of_a_key_and_moves_nothing_after_it(t
         "navigation": 0.5, "joystick": 0.5, "keyboard": 0.5, "tablet": 0.4,
     }  # fmt: skip
     mux = rested(sources)
-    mux.on_command("tablet", Twist(0.2, 0.0), 1.0)  # once, as a page that has only buttons does
+    mux.accept_command("tablet", Twist(0.2, 0.0), 1.0)  # once, as a page that has only buttons does
     assert mux.decide(1.4).twist.linear_mps == 0.2
     assert (mux.decide(1.41).active, mux.decide(1.41).twist) == (None, ZERO)
-    mux.on_command("navigation", Twist(0.1, 0.0), 1.5)
+    mux.accept_command("navigation", Twist(0.1, 0.0), 1.5)
     assert mux.decide(1.5).active == "navigation"  # a topic that is silent blocks nobody
 
 

@@ -17,7 +17,7 @@ from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 from typer.testing import CliRunner
 
-from canbase_action_server.along_track import Pose
+from canbase_action_server.along_track import BasePose
 from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.inputs import Driver, Inputs, Mux, Safety
 from canbase_action_server.inputs import Odometry as OdometryInput
@@ -84,7 +84,7 @@ def step(name: str, at_s: float = WALL_S - 2.0, uuid: str | None = "cd", **value
 
 
 INPUTS = Inputs(
-    odometry=Received(OdometryInput(9.9, Pose(0.0, 0.0, 0.0), 0.0, 0.0), 9.9),
+    odometry=Received(OdometryInput(9.9, BasePose(0.0, 0.0, 0.0), 0.0, 0.0), 9.9),
     safety=Received(Safety(False, StopCause.NONE, "", False), 9.9),
     driver=Received(
         Driver(DriverState.ENABLED, "none", "", WatchdogView.OK, "none", standstill=True, hears_command=True), 9.9

@@ -52,7 +52,7 @@ def test_each_standing_of_the_source_that_holds_the_base_is_read_back() -> None:
         (1.4, MOVES, 2.4, SourceStanding.DELAYED),
     ):
         mux.on_driver(DriverState.ENABLED, 1, now_s)
-        mux.on_command("joystick", twist, now_s, sent=Sent(stamp_s, now_s, now_s))
+        mux.accept_command("joystick", twist, now_s, sent=Sent(stamp_s, now_s, now_s))
         assert told(mux, now_s) == [expected, never]
     assert told(mux, 2.0) == [SourceStanding.SILENT, never]
 
@@ -61,7 +61,7 @@ def test_two_publishers_on_the_topic_of_a_joystick_leave_it_unarmed() -> None:
     """The sentence is about the publishers then, and says nothing of a zero."""
     mux = Mux({"joystick": MuxSource(topic="a", priority=9, timeout_s=0.3)})
     mux.on_publishers("a", ["joy", "other"])
-    mux.on_command("joystick", ZERO, 1.0)
+    mux.accept_command("joystick", ZERO, 1.0)
     assert told(mux, 1.0) == [SourceStanding.UNARMED]
 
 

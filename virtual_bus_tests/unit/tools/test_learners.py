@@ -94,10 +94,10 @@ def sent(delay_s: float, now_s: float) -> Sent:
 
 def delay_is_never_forgotten() -> None:
     watch = Delay(same_clock=False)
-    watch.take(sent(0.0, 1.0))
+    watch.measure(sent(0.0, 1.0))
     for at in range(OFTEN):
-        watch.take(sent(1.0 + RANDOM.random() * 100.0, 10.0 + at))
-    assert watch.take(sent(1.0, 1e6)) == pytest.approx(1.0)
+        watch.measure(sent(1.0 + RANDOM.random() * 100.0, 10.0 + at))
+    assert watch.measure(sent(1.0, 1e6)) == pytest.approx(1.0)
 
 
 def glitch_filter_delays_by_one_scan() -> None:

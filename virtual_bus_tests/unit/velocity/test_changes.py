@@ -26,7 +26,7 @@ FORWARD = Twist(0.5, 0.0)
 def test_from_first_command_to_silence() -> None:
     mux = rested(SOURCES, LOCKS)
     nobody = mux.decide(0.0)
-    mux.on_command("nav", FORWARD, 1.0)
+    mux.accept_command("nav", FORWARD, 1.0)
     nav = mux.decide(1.0)
     silent = mux.decide(1.6)
 
@@ -41,7 +41,7 @@ def test_from_first_command_to_silence() -> None:
 
 def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
     mux = rested(SOURCES, LOCKS)
-    mux.on_command("nav", FORWARD, 1.0)
+    mux.accept_command("nav", FORWARD, 1.0)
     nav = mux.decide(1.0)
     mux.on_lock("gate", True, 1.1)
     locked = mux.decide(1.1)
@@ -62,10 +62,10 @@ def test_a_source_that_is_not_followed_is_a_notice_with_what_it_waits_for() -> N
     mux = rested(SOURCES, LOCKS)
     nobody = mux.decide(0.9)
     mux.on_estop(False)
-    mux.on_command("joy", FORWARD, 1.0)
+    mux.accept_command("joy", FORWARD, 1.0)
     held = mux.decide(1.0)
     mux.on_estop(True)
-    mux.on_command("joy", ZERO, 1.2)
+    mux.accept_command("joy", ZERO, 1.2)
     released = mux.decide(1.2)
 
     ((sentence, priority, fields),) = changes(nobody, held)

@@ -65,7 +65,7 @@ class Two:
                 if sent is not None:
                     stamped = dataclasses.replace(sent, stamp_ns=round(self.now_s * 1e9) + step)
                     self.filter.on_laser_scan(topic, stamped, self.place, self.now_s, self.now_s)
-            self.filter.on_command(command, self.now_s)
+            self.filter.accept_command(command, self.now_s)
             decision = self.filter.decide(self.now_s)
         return decision
 

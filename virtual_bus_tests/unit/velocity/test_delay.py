@@ -37,7 +37,7 @@ class Link:
             self.sent_s += every_s
             self.now_s = max(self.now_s, self.sent_s + delay_s)
             stamp_s = self.sent_s + WALL_S + self.apart_s
-            self.mux.on_command("joystick", twist, self.now_s, sent=Sent(stamp_s, WALL_S + self.now_s, self.now_s))
+            self.mux.accept_command("joystick", twist, self.now_s, sent=Sent(stamp_s, WALL_S + self.now_s, self.now_s))
         return self.mux.decide(self.now_s)
 
     def restart(self) -> None:
@@ -93,7 +93,7 @@ def test_a_short_burst_after_a_gap_is_followed_again_without_a_zero(link: Link) 
 def test_a_late_source_keeps_a_lower_one_from_driving(link: Link) -> None:
     link.send(ZERO, 0.01, 1.0)
     link.send(FORWARD, 1.0)
-    link.mux.on_command("navigation", FORWARD, link.now_s)
+    link.mux.accept_command("navigation", FORWARD, link.now_s)
     decision = link.mux.decide(link.now_s)
     assert (decision.active, decision.twist) == ("joystick", ZERO)
 
@@ -197,7 +197,7 @@ def test_a_clock_that_is_set_back_by_less_than_the_timeout_needs_a_zero(same_clo
 def test_the_same_stamp_again_and_again_grows_old() -> None:
     mux = rested()
     for step in range(20):
-        mux.on_command("joystick", FORWARD, 0.05 * step, sent=Sent(5.0, 5.0 + 0.05 * step, 0.05 * step))
+        mux.accept_command("joystick", FORWARD, 0.05 * step, sent=Sent(5.0, 5.0 + 0.05 * step, 0.05 * step))
     assert mux.decide(0.95).sources[0].reason == "delayed by 0.95 s (limit 0.30 s, same_clock true)"
 
 
@@ -206,7 +206,9 @@ def test_a_command_that_a_newer_one_has_overtaken_is_not_followed_before_the_nex
     link.send(ZERO, 0.0, 0.5)
     assert link.send(FORWARD, 0.0, 0.5).twist == FORWARD
     for twist, sent_s, now_s in ((ZERO, 1.10, 1.11), (FORWARD, 1.05, 1.12)):
-        link.mux.on_command("joystick", twist, now_s, sent=Sent(sent_s + WALL_S + link.apart_s, WALL_S + now_s, now_s))
+        link.mux.accept_command(
+            "joystick", twist, now_s, sent=Sent(sent_s + WALL_S + link.apart_s, WALL_S + now_s, now_s)
+        )
     decision = link.mux.decide(1.12)
     assert decision.twist == ZERO
     assert decision.sources[0].reason.startswith("waiting for zero")
@@ -223,12 +225,12 @@ def test_a_command_that_arrives_twice_holds_no_longer_than_once(again_s: float) 
         twist, at_s = (FORWARD if step < 10 else ZERO), PERIOD_S * step
         for mux, arrivals in ((once, (at_s,)), (twice, (at_s, at_s + again_s))):
             for now_s in arrivals:
-                mux.on_command("joystick", twist, now_s, sent=Sent(WALL_S + at_s, WALL_S + now_s, now_s))
+                mux.accept_command("joystick", twist, now_s, sent=Sent(WALL_S + at_s, WALL_S + now_s, now_s))
         assert twice.decide(at_s + again_s).twist == once.decide(at_s + again_s).twist == twist
     last_s = PERIOD_S * 20
     for mux, arrivals in ((once, (last_s,)), (twice, (last_s, last_s + again_s))):
         for now_s in arrivals:
-            mux.on_command("joystick", FORWARD, now_s, sent=Sent(WALL_S + last_s, WALL_S + now_s, now_s))
+            mux.accept_command("joystick", FORWARD, now_s, sent=Sent(WALL_S + last_s, WALL_S + now_s, now_s))
     for age_s in (0.29, 0.31):
         assert (
             twice.decide(last_s + age_s).twist
@@ -239,7 +241,7 @@ def test_a_command_that_arrives_twice_holds_no_longer_than_once(again_s: float) 
 
 def test_without_a_stamp_nothing_is_known_of_the_delay() -> None:
     mux = rested()
-    mux.on_command("joystick", FORWARD, 0.0)
+    mux.accept_command("joystick", FORWARD, 0.0)
     assert mux.decide(0.0).sources[0].delay_s is None
     assert mux.decide(0.0).twist == FORWARD
 
@@ -252,7 +254,7 @@ def test_without_a_stamp_nothing_is_known_of_the_delay() -> None:
 def test_with_the_same_clock_the_age_of_the_stamp_counts_from_the_first_message_on(age_s: float, reason: str) -> None:
     source = MuxSource(topic="x", priority=1, timeout_s=0.3, same_clock=True)
     mux = rested({"local": source})
-    mux.on_command("local", FORWARD, 0.0, sent=Sent(WALL_S - age_s, WALL_S, 0.0))
+    mux.accept_command("local", FORWARD, 0.0, sent=Sent(WALL_S - age_s, WALL_S, 0.0))
     assert mux.decide(0.0).sources[0].reason == reason
     assert mux.decide(0.0).twist == (ZERO if reason else FORWARD)
 
@@ -261,22 +263,22 @@ def test_two_senders_on_one_topic_whose_clocks_differ_are_never_followed() -> No
     mux = rested()
     for step in range(40):
         stamp_s = WALL_S + 0.05 * step - (0.2 if step % 2 else 0.0)
-        mux.on_command("joystick", FORWARD, 0.05 * step, sent=Sent(stamp_s, WALL_S + 0.05 * step, 0.05 * step))
+        mux.accept_command("joystick", FORWARD, 0.05 * step, sent=Sent(stamp_s, WALL_S + 0.05 * step, 0.05 * step))
     assert mux.decide(1.95).twist == ZERO
 
 
 def test_delays_are_small_numbers_though_clocks_are_far_apart() -> None:
     delay = Delay(same_clock=False)
-    assert delay.take(Sent(WALL_S, 0.0, 1.0)) == 0.0
-    assert delay.take(Sent(WALL_S + 1.0, 0.0, 2.25)) == pytest.approx(0.25)
+    assert delay.measure(Sent(WALL_S, 0.0, 1.0)) == 0.0
+    assert delay.measure(Sent(WALL_S + 1.0, 0.0, 2.25)) == pytest.approx(0.25)
     assert not delay.set_back
 
 
 def test_each_source_has_a_delay_of_its_own() -> None:
     other = {name: source.model_copy(update={"same_clock": False}) for name, source in DEFAULT_SOURCES.items()}
     mux = rested(other)
-    mux.on_command("joystick", FORWARD, 1.0, sent=Sent(9.0, 0.0, 1.0))
-    mux.on_command("navigation", FORWARD, 1.0, sent=Sent(700.0, 0.0, 1.0))
+    mux.accept_command("joystick", FORWARD, 1.0, sent=Sent(9.0, 0.0, 1.0))
+    mux.accept_command("navigation", FORWARD, 1.0, sent=Sent(700.0, 0.0, 1.0))
     assert [source.delay_s for source in mux.decide(1.0).sources] == [0.0, 0.0, None]
 
 
@@ -300,5 +302,5 @@ def test_stamps_may_go_back_by_5_ms() -> None:
     delay = Delay(same_clock=False)
     assert delay.set_back is False
     for stamp_s, set_back in ((SET_BACK_S, False), (0.0, False), (math.nextafter(-SET_BACK_S, -1.0), True)):
-        delay.take(Sent(stamp_s, 0.0, 0.0))
+        delay.measure(Sent(stamp_s, 0.0, 0.0))
         assert delay.set_back is set_back

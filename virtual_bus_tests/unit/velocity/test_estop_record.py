@@ -41,7 +41,7 @@ class Robot:
 
     def order(self, twist: Twist) -> Decision:
         self.now_s += 0.02
-        self.filter.on_command(twist, self.now_s)
+        self.filter.accept_command(twist, self.now_s)
         decision = self.filter.decide(self.now_s)
         self.filter.on_record(*self.disk.write(self.filter.record))
         return decision

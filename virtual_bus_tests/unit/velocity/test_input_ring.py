@@ -34,7 +34,7 @@ def test_what_is_older_than_the_recording_and_a_checkpoint_is_forgotten() -> Non
     ring, (mux, safety) = InputRing(10.0), cores()
     for tenth in range(400):
         ring.note("obey", tenth / 10, tenth / 10)
-        ring.look(mux, safety, tenth / 10)
+        ring.keep_recent(mux, safety, tenth / 10)
     kept = ring.cut()
     assert kept[0][1] == pytest.approx(39.9 - 10.0 - CHECKPOINT_S, abs=0.11)
     states = [each[1] for each in kept if each[0] == "state"]
@@ -45,7 +45,7 @@ def test_large_scans_make_it_shorter_and_not_larger() -> None:
     ring, (mux, safety) = InputRing(10.0), cores()
     for number in range(100):
         ring.note("scan", number / 100, "scan", scan(50_000), None)
-        ring.look(mux, safety, number / 100)
+        ring.keep_recent(mux, safety, number / 100)
     assert len([each for each in ring.cut() if each[0] == "scan"]) == input_ring.MAX_SCAN_BYTES // 200_000
 
 
@@ -54,7 +54,7 @@ def test_a_flood_of_messages_makes_it_shorter_and_not_larger(monkeypatch: pytest
     ring, (mux, safety) = InputRing(10.0), cores()
     for number in range(500):
         ring.note("obey", 1.0, float(number))
-    ring.look(mux, safety, 1.0)
+    ring.keep_recent(mux, safety, 1.0)
     assert len(ring.cut()) == 100
 
 
@@ -62,7 +62,7 @@ def test_a_file_begins_with_the_first_state_and_has_no_other_one() -> None:
     ring, (mux, safety) = InputRing(10.0), cores()
     ring.note("obey", 0.5, 0.5)
     for now_s in (1.0, 6.5):
-        ring.look(mux, safety, now_s)
+        ring.keep_recent(mux, safety, now_s)
         ring.note("scan", now_s, "scan", scan(3), None)
     first = head(ROBOT, FilterConfig.of(ROBOT), Stop(6.0, "estop"), 1.79e9)
     told = [json.loads(line) for line in lines(first, ring.cut())]
@@ -80,27 +80,27 @@ def test_of_a_state_that_has_a_function_in_it_nothing_is_written() -> None:
 # driver LATCHED ── 1 s ── due; LATCHED until the reset is one stop
 def test_a_latched_driver_is_one_stop() -> None:
     watch = StopWatch()
-    assert watch.look(DriverState.OFFLINE, True, 0.0) is None
-    assert watch.look(ENABLED, True, 1.0) is None
-    assert watch.look(LATCHED, True, 2.0) is None
-    assert watch.look(LATCHED, True, 2.9) is None
-    assert watch.look(LATCHED, True, 3.0) == Stop(2.0, "driver")
-    assert watch.look(LATCHED, True, 9.0) is None
-    assert watch.look(ENABLED, True, 10.0) is None
-    assert watch.look(LATCHED, True, 11.0) is None
-    assert watch.look(STOPPING, True, 12.0) == Stop(11.0, "driver")
+    assert watch.due_stop(DriverState.OFFLINE, True, 0.0) is None
+    assert watch.due_stop(ENABLED, True, 1.0) is None
+    assert watch.due_stop(LATCHED, True, 2.0) is None
+    assert watch.due_stop(LATCHED, True, 2.9) is None
+    assert watch.due_stop(LATCHED, True, 3.0) == Stop(2.0, "driver")
+    assert watch.due_stop(LATCHED, True, 9.0) is None
+    assert watch.due_stop(ENABLED, True, 10.0) is None
+    assert watch.due_stop(LATCHED, True, 11.0) is None
+    assert watch.due_stop(STOPPING, True, 12.0) == Stop(11.0, "driver")
 
 
 def test_the_button_is_a_stop_and_what_follows_is_the_same_one() -> None:
     watch = StopWatch()
-    watch.look(ENABLED, True, 1.0)
-    watch.look(ENABLED, False, 2.0)
-    watch.look(LATCHED, False, 2.5)
-    assert watch.look(LATCHED, False, 3.0) == Stop(2.0, "estop")
-    assert watch.look(LATCHED, False, 9.0) is None
+    watch.due_stop(ENABLED, True, 1.0)
+    watch.due_stop(ENABLED, False, 2.0)
+    watch.due_stop(LATCHED, False, 2.5)
+    assert watch.due_stop(LATCHED, False, 3.0) == Stop(2.0, "estop")
+    assert watch.due_stop(LATCHED, False, 9.0) is None
 
 
 def test_what_was_latched_at_the_start_is_no_new_stop() -> None:
     watch = StopWatch()
     for now_s in (0.0, 1.0, 2.0):
-        assert watch.look(LATCHED, False, now_s) is None
+        assert watch.due_stop(LATCHED, False, now_s) is None

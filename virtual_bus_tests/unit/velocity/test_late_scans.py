@@ -126,7 +126,7 @@ def test_a_second_scanner_whose_age_is_known_lets_the_base_drive_where_it_looks(
         for scanner in robot.safety.scans:
             scan = dataclasses.replace(lidar.scan(WALL), stamp_ns=round(now_s * 1e9))
             made.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now_s, now_s)
-        made.on_command(AHEAD, now_s)
+        made.accept_command(AHEAD, now_s)
         decision = made.decide(now_s)
     assert decision.twist == AHEAD
 
@@ -157,6 +157,6 @@ class Slow:
             now_s = self.at_s + delay_s
             scan: Scan = dataclasses.replace(self.lidar.scan(WALL), stamp_ns=round(self.at_s * 1e9))
             self.filter.on_laser_scan(scanner.topic, scan, Placement.of(scanner), now_s, now_s)
-            self.filter.on_command(Twist(0.1, 0.0), now_s)
+            self.filter.accept_command(Twist(0.1, 0.0), now_s)
             moves = not self.filter.decide(now_s).twist.is_zero
         return moves

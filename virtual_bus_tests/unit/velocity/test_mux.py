@@ -53,38 +53,38 @@ def test_sources_are_listed_by_falling_priority_whatever_their_order_in_the_file
 
 def test_priority_0_drives_when_it_is_alone() -> None:
     mux = rested({"low": MuxSource(topic="a", priority=0, timeout_s=0.3)})
-    mux.on_command("low", SLOW, 1.0)
+    mux.accept_command("low", SLOW, 1.0)
     assert mux.decide(1.0).twist == SLOW
 
 
 def test_the_joystick_takes_over_at_once_and_gives_back_only_to_a_source_that_still_talks(mux: Mux) -> None:
-    mux.on_command("action", SLOW, 10.0)
+    mux.accept_command("action", SLOW, 10.0)
     assert mux.decide(10.0).active == "action"
-    mux.on_command("joystick", FAST, 10.1)  # somebody takes the joystick
+    mux.accept_command("joystick", FAST, 10.1)  # somebody takes the joystick
     decision = mux.decide(10.1)
     assert (decision.active, decision.twist) == ("joystick", FAST)
     assert reasons(decision)["action"] == "joystick has priority"
-    mux.on_command("joystick", ZERO, 10.25)  # let go: it still holds, with zero
+    mux.accept_command("joystick", ZERO, 10.25)  # let go: it still holds, with zero
     assert mux.decide(10.30) == mux.decide(10.30)
     assert (mux.decide(10.30).active, mux.decide(10.30).twist) == ("joystick", ZERO)
     decision = mux.decide(10.56)  # the joystick is silent; so is the action, whose old command must not come back
     assert (decision.active, decision.twist) == (None, ZERO)
     assert reasons(decision)["joystick"] == "no message for 0.31 s (timeout 0.30 s)"
     assert reasons(decision)["action"] == "no message for 0.56 s (timeout 0.30 s)"
-    mux.on_command("action", SLOW, 10.60)  # a new command of its own
+    mux.accept_command("action", SLOW, 10.60)  # a new command of its own
     assert mux.decide(10.60).active == "action"
 
 
 def test_a_silent_source_is_told_as_silent_though_a_higher_one_drives(mux: Mux) -> None:
-    mux.on_command("navigation", SLOW, 0.0)
-    mux.on_command("joystick", FAST, 0.6)
+    mux.accept_command("navigation", SLOW, 0.0)
+    mux.accept_command("joystick", FAST, 0.6)
     assert reasons(mux.decide(0.6))["navigation"] == "no message for 0.60 s (timeout 0.50 s)"
 
 
 def test_a_lower_source_that_kept_talking_drives_on_with_its_newest_command(mux: Mux) -> None:
-    mux.on_command("joystick", FAST, 0.0)
-    mux.on_command("navigation", SLOW, 0.1)
-    mux.on_command("navigation", Twist(0.3, 0.0), 0.3)
+    mux.accept_command("joystick", FAST, 0.0)
+    mux.accept_command("navigation", SLOW, 0.1)
+    mux.accept_command("navigation", Twist(0.3, 0.0), 0.3)
     assert mux.decide(0.3).active == "joystick"
     decision = mux.decide(0.301)
     assert (decision.active, decision.twist) == ("navigation", Twist(0.3, 0.0))
@@ -92,16 +92,16 @@ def test_a_lower_source_that_kept_talking_drives_on_with_its_newest_command(mux:
 
 @pytest.mark.parametrize("name", TIMEOUTS_S)
 def test_a_source_holds_until_exactly_its_timeout(mux: Mux, name: str) -> None:
-    mux.on_command(name, FAST, 0.0)
+    mux.accept_command(name, FAST, 0.0)
     assert mux.decide(TIMEOUTS_S[name]).twist == FAST
     assert mux.decide(math.nextafter(TIMEOUTS_S[name], math.inf)).twist == ZERO
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_a_command_that_is_not_finite_is_refused_counted_and_keeps_nobody_fresh(mux: Mux, number: float) -> None:
-    assert mux.on_command("joystick", FAST, 0.0) is True
-    assert mux.on_command("joystick", Twist(number, 0.0), 0.2) is False
-    assert mux.on_command("joystick", Twist(0.0, number), 0.3) is False
+    assert mux.accept_command("joystick", FAST, 0.0) is True
+    assert mux.accept_command("joystick", Twist(number, 0.0), 0.2) is False
+    assert mux.accept_command("joystick", Twist(0.0, number), 0.3) is False
     joystick = mux.decide(0.3).sources[0]
     assert (joystick.received, joystick.refused, joystick.age_s) == (1, 2, 0.3)
     assert mux.decide(0.3).twist == FAST
@@ -112,7 +112,7 @@ def test_a_source_whose_messages_are_refused_says_why_until_one_is_valid(mux: Mu
     mux.refuse("navigation", "1 joints instead of 2")
     never = "never received; its newest message was refused: 1 joints instead of 2"
     assert reasons(mux.decide(0.0))["navigation"] == never
-    mux.on_command("navigation", SLOW, 0.1)
+    mux.accept_command("navigation", SLOW, 0.1)
     assert mux.decide(0.1).twist == SLOW
     mux.refuse("navigation", "the speed of left_wheel is nan: NaN or infinity")
     assert mux.decide(0.6).twist == SLOW  # 0.5 s after the valid one: a refused message does not end it ...
@@ -122,13 +122,13 @@ def test_a_source_whose_messages_are_refused_says_why_until_one_is_valid(mux: Mu
         "no message for 0.51 s (timeout 0.50 s); its newest message was refused: the speed of left_wheel is nan: "
         "NaN or infinity"
     )
-    mux.on_command("navigation", SLOW, 0.7)
+    mux.accept_command("navigation", SLOW, 0.7)
     assert reasons(mux.decide(1.3))["navigation"] == "no message for 0.60 s (timeout 0.50 s)"
 
 
 def test_a_source_that_the_configuration_does_not_name_is_our_own_error(mux: Mux) -> None:
     with pytest.raises(KeyError, match="gamepad"):
-        mux.on_command("gamepad", FAST, 0.0)
+        mux.accept_command("gamepad", FAST, 0.0)
 
 
 def test_a_mux_without_sources_is_refused() -> None:
@@ -137,7 +137,7 @@ def test_a_mux_without_sources_is_refused() -> None:
 
 
 def test_at_shutdown_zero_is_ordered_whoever_wants_to_drive(mux: Mux) -> None:
-    mux.on_command("joystick", FAST, 0.0)
+    mux.accept_command("joystick", FAST, 0.0)
     decision = mux.shutdown(0.1)
     assert (decision.active, decision.twist) == (None, ZERO)
     assert standings(decision) == [SourceStanding.SHUTDOWN] * 3
@@ -145,7 +145,7 @@ def test_at_shutdown_zero_is_ordered_whoever_wants_to_drive(mux: Mux) -> None:
 
 
 def test_the_essence_changes_with_the_reason_and_not_with_the_age(mux: Mux) -> None:
-    mux.on_command("navigation", SLOW, 0.0)
+    mux.accept_command("navigation", SLOW, 0.0)
     first, later, silent = mux.decide(0.1), mux.decide(0.2), mux.decide(0.6)
     assert first.essence == later.essence
     assert first.essence != silent.essence
@@ -159,7 +159,7 @@ BUTTON = MuxLock(topic="button", priority=255, timeout_s=0.5)
 
 def test_a_lock_holds_back_the_sources_below_it_and_not_those_above() -> None:
     mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
-    mux.on_command("navigation", SLOW, 0.0)
+    mux.accept_command("navigation", SLOW, 0.0)
     assert mux.decide(0.0).active == "navigation"  # a lock that is not required says nothing, and does not hold
     mux.on_lock("pause", True, 0.1)
     decision = mux.decide(0.1)
@@ -167,41 +167,41 @@ def test_a_lock_holds_back_the_sources_below_it_and_not_those_above() -> None:
     assert reasons(decision) == {
         "joystick": "never received", "navigation": "locked: pause holds", "action": "locked: pause holds",
     }  # fmt: skip
-    mux.on_command("joystick", FAST, 0.2)  # somebody drives it by hand all the same
+    mux.accept_command("joystick", FAST, 0.2)  # somebody drives it by hand all the same
     assert mux.decide(0.2).active == "joystick"
     mux.on_lock("pause", False, 0.3)
-    mux.on_command("navigation", SLOW, 0.3)
-    mux.on_command("joystick", FAST, 0.3)
+    mux.accept_command("navigation", SLOW, 0.3)
+    mux.accept_command("joystick", FAST, 0.3)
     assert reasons(mux.decide(0.3))["navigation"] == "joystick has priority"
 
 
 def test_a_source_with_the_priority_of_the_lock_is_not_held_back() -> None:
     mux = rested(DEFAULT_SOURCES, {"alike": MuxLock(topic="x", priority=50)})
-    mux.on_command("navigation", SLOW, 0.0)
+    mux.accept_command("navigation", SLOW, 0.0)
     assert mux.decide(0.0).active == "navigation"
-    mux.on_command("action", FAST, 0.6)
+    mux.accept_command("action", FAST, 0.6)
     assert mux.decide(0.6).active is None
 
 
 def test_a_required_lock_holds_until_it_is_heard_and_again_when_it_falls_silent() -> None:
     mux = rested(DEFAULT_SOURCES, {"button": BUTTON})
-    mux.on_command("joystick", FAST, 0.0)
+    mux.accept_command("joystick", FAST, 0.0)
     assert reasons(mux.decide(0.0))["joystick"] == "locked: button has published nothing yet on button"
     mux.on_lock("button", False, 0.1)
     assert mux.decide(0.1).active == "joystick"
-    mux.on_command("joystick", FAST, 0.6)
+    mux.accept_command("joystick", FAST, 0.6)
     assert mux.decide(0.6).active == "joystick"  # 0.5 s after its word, exactly its timeout
     decision = mux.decide(math.nextafter(0.6, 1.0))
     assert reasons(decision)["joystick"] == "locked: button has published nothing for 0.50 s (timeout 0.50 s)"
     mux.on_lock("button", False, 0.7)
-    mux.on_command("joystick", FAST, 0.7)
+    mux.accept_command("joystick", FAST, 0.7)
     assert mux.decide(0.7).twist == FAST
 
 
 def test_the_last_true_of_a_lock_holds_however_long_it_is_silent() -> None:
     mux = rested(DEFAULT_SOURCES, {"pause": PAUSE})
     mux.on_lock("pause", True, 0.0)
-    mux.on_command("action", FAST, 9999.0)
+    mux.accept_command("action", FAST, 9999.0)
     decision = mux.decide(9999.0)
     assert decision.twist == ZERO
     (lock,) = decision.locks
@@ -253,7 +253,7 @@ def stranger(source: str | None, *, obeyed: bool = True) -> Foreign:
 
 
 def test_a_foreign_publisher_is_reported_and_holds_nobody_back_unless_the_configuration_says_so(mux: Mux) -> None:
-    mux.on_command("action", SLOW, 0.0)
+    mux.accept_command("action", SLOW, 0.0)
     quiet = mux.decide(0.0)
     mux.on_foreign([stranger("action"), stranger(None)])
     decision = mux.decide(0.0)
@@ -265,9 +265,9 @@ def test_a_foreign_publisher_is_reported_and_holds_nobody_back_unless_the_config
 def test_a_foreign_publisher_locks_its_source_alone_or_all_of_them_when_it_speaks_for_the_chain() -> None:
     mux = rested(DEFAULT_SOURCES, foreign_lock=True)
     mux.on_foreign([stranger("action")])
-    mux.on_command("action", SLOW, 0.0)
+    mux.accept_command("action", SLOW, 0.0)
     assert reasons(mux.decide(0.0))["action"] == "locked: /evil publishes on /t: only /good should"
-    mux.on_command("joystick", FAST, 0.0)
+    mux.accept_command("joystick", FAST, 0.0)
     assert mux.decide(0.0).active == "joystick"
     mux.on_foreign([stranger(None)])
     assert (mux.decide(0.0).active, mux.decide(0.0).twist) == (None, ZERO)
@@ -292,7 +292,7 @@ def test_the_order_is_the_newest_valid_command_of_the_highest_fresh_source_or_ze
     mux, now_s, newest = rested(), 0.0, dict[str, tuple[Twist, float]]()
     for name, twist, before_s in commands:
         now_s += before_s
-        mux.on_command(name, twist, now_s)
+        mux.accept_command(name, twist, now_s)
         if twist.is_finite:
             newest[name] = (twist, now_s)
     now_s += pause_s

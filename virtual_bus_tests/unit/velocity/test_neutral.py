@@ -151,18 +151,18 @@ def test_zeros_while_the_base_is_not_ready_arm(story: Story) -> None:
 
 def test_nan_neither_arms_nor_disarms(story: Story) -> None:
     assert not story.followed("joystick")
-    story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now_s)
+    story.mux.accept_command("joystick", Twist(float("nan"), 0.0), story.now_s)
     assert not story.decide().sources[0].armed
     story.release()
     story.driver = DriverState.LATCHED
     story.run(0.2)
-    story.mux.on_command("joystick", Twist(float("nan"), 0.0), story.now_s)
+    story.mux.accept_command("joystick", Twist(float("nan"), 0.0), story.now_s)
     assert story.decide().sources[0].armed
 
 
 def test_a_zero_that_waited_while_this_process_stood_still_does_not_arm() -> None:
     mux = Mux(DEFAULT_SOURCES)
-    mux.on_command("joystick", ZERO, received=100.0, now_s=103.0)
+    mux.accept_command("joystick", ZERO, received=100.0, now_s=103.0)
     assert not mux.decide(103.0).sources[0].armed
 
 
@@ -191,7 +191,7 @@ def test_the_status_timeout_covers_a_slow_status() -> None:
 def test_absence_arms_at_exactly_its_key(absent_s: float | None, silence_s: float, armed: bool) -> None:
     arming = Arming(absent_s)
     arming.missed(10.0)
-    arming.look("not ready", 10.0 + silence_s, silent=True)
+    arming.advance("not ready", 10.0 + silence_s, silent=True)
     assert arming.armed is armed
 
 
@@ -229,7 +229,7 @@ def test_no_motion_reaches_the_base_without_a_zero_since_the_last_motion_while_i
 
 def test_before_anything_was_watched_nothing_is_absent() -> None:
     arming = Arming(2.0)
-    arming.look("", 1e9, silent=True)
+    arming.advance("", 1e9, silent=True)
     assert not arming.armed
 
 
@@ -273,7 +273,7 @@ def test_what_waited_in_the_radio_comes_at_once_after_a_stop_and_is_not_followed
 
     def say(twist: Twist, sent_s: float) -> None:
         sent = Sent(1000.0 + sent_s, 1000.0 + story.now_s, story.now_s)
-        story.mux.on_command("joystick", twist, story.now_s, sent=sent)
+        story.mux.accept_command("joystick", twist, story.now_s, sent=sent)
 
     for _ in range(50):
         story.run(STEP_S)

@@ -38,7 +38,7 @@ def test_after_the_emergency_stop_is_released_the_command_has_to_be_zero_once() 
 def test_a_short_press_between_two_decisions_is_not_missed() -> None:
     safety = fed(0.0, ZERO)
     safety.decide(0.0)
-    safety.on_command(Twist(0.5, 0.0), 0.1)
+    safety.accept_command(Twist(0.5, 0.0), 0.1)
     safety.on_estop(True, 0.101)
     safety.on_estop(False, 0.102)
     assert safety.decide(0.103).cause is StopCause.ESTOP
@@ -48,7 +48,7 @@ def test_a_required_emergency_stop_that_was_silent_needs_a_zero_command_too() ->
     drive = Twist(0.5, 0.0)
     safety = fed(0.0, ZERO)
     safety.decide(0.0)
-    safety.on_command(drive, 0.51)
+    safety.accept_command(drive, 0.51)
     see(safety, 0.51)
     assert safety.decide(0.51).cause is StopCause.ESTOP_STALE
     fed(0.6, drive, the_filter=safety)
@@ -62,7 +62,7 @@ def test_a_stale_zero_command_does_not_free_the_emergency_stop() -> None:
     safety.decide(0.0)
     safety.on_estop(False, 0.3)
     assert safety.decide(0.3).cause is StopCause.ESTOP  # the zero is 0.3 s old, its timeout 0.2 s
-    safety.on_command(Twist(0.5, 0.0), 0.31)
+    safety.accept_command(Twist(0.5, 0.0), 0.31)
     assert safety.decide(0.31).cause is StopCause.ESTOP
 
 
@@ -75,7 +75,7 @@ def test_the_zero_command_counts_until_exactly_its_timeout() -> None:
 
 def test_without_an_emergency_stop_nothing_waits_for_a_zero_command() -> None:
     safety = SafetyFilter(config(scan=False, estop=False))
-    safety.on_command(Twist(0.5, 0.0), 0.0)
+    safety.accept_command(Twist(0.5, 0.0), 0.0)
     assert safety.decide(0.0).twist == Twist(0.5, 0.0)
 
 
@@ -114,7 +114,7 @@ def test_a_latched_emergency_stop_needs_a_reset_after_its_release() -> None:
 
 def test_a_silence_of_the_stop_button_is_latched_once_it_was_heard() -> None:
     safety = latched(0.0, ZERO)
-    safety.on_command(ZERO, 0.6)
+    safety.accept_command(ZERO, 0.6)
     see(safety, 0.6)
     assert safety.decide(0.6).cause is StopCause.ESTOP_STALE
     assert safety.reset((), 0.6) == (False, "refused: the emergency stop on estop_state is not published")

@@ -203,7 +203,7 @@ def test_the_way_ordered_since_the_scan_is_counted() -> None:
     orders = {}
     for step in range(1, 14):
         now_s = 2.0 + step * HOLD_S
-        safety.on_command(Twist(1.0, 0.0), now_s)
+        safety.accept_command(Twist(1.0, 0.0), now_s)
         safety.on_estop(False, now_s)
         orders[step] = safety.decide(now_s).twist.linear_mps
     assert orders[1] == pytest.approx(0.96, abs=0.03)

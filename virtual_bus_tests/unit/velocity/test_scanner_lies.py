@@ -285,7 +285,7 @@ def test_one_reading_in_range_may_come_again_by_chance_and_many_may_not() -> Non
             ranges_m = np.full(360, np.inf)
             ranges_m[:beams] = 4.0 + 0.001 * (number % 3)
             scan = Scan(ranges_m, -math.pi, math.tau / 360, 0.05, 10.0)
-            told = told or watch.look(scan, 0.05 * number, moves=False)
+            told = told or watch.check_scan(scan, 0.05 * number, moves=False)
         assert bool(told) is frozen
         assert not frozen or told.endswith("3 scans by turns")
 
@@ -308,7 +308,7 @@ def part_of(
         ranges_m[[beam % 360 for beam in frozen]] = old_m
         ranges_m[list(unread)] = NAN
         scan = Scan(ranges_m, -math.pi, math.tau / 360, 0.05, 10.0)
-        told = told or watch.look(scan, 0.05 * number, moves=moves)
+        told = told or watch.check_scan(scan, 0.05 * number, moves=moves)
     return told
 
 

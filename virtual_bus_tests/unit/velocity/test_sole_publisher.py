@@ -25,15 +25,15 @@ PLACE = Placement(0.0, 0.0, (1.0, 0.0), (0.0, 1.0))
 @pytest.mark.parametrize(("together_s", "latched"), [(0.0, False), (LATCHED_S - 0.5, False), (LATCHED_S, True)])
 def test_two_that_were_together_for_long_are_two_scanners(together_s: float, latched: bool) -> None:
     sole = SolePublisher()
-    sole.look(ONE, ONE, 9.5)
+    sole.check_publishers(ONE, ONE, 9.5)
     assert sole.problem == ""
     for step in range(round(together_s / 0.5) + 1):
-        sole.look(TWO, TWO, 10.0 + 0.5 * step)
+        sole.check_publishers(TWO, TWO, 10.0 + 0.5 * step)
         assert sole.problem.startswith("2 publishers (/front, /rear): give each scanner a topic")
     assert ("until the next start" in sole.problem) is latched
-    sole.look(ONE, ONE, 10.5 + together_s)
+    sole.check_publishers(ONE, ONE, 10.5 + together_s)
     assert bool(sole.problem) is latched
-    sole.look((), (), 11.0 + together_s)
+    sole.check_publishers((), (), 11.0 + together_s)
     assert bool(sole.problem) is latched
 
 
@@ -52,7 +52,7 @@ def test_a_driver_that_is_started_again_and_again_is_one_scanner(starts_s: tuple
     for step in range(240):
         now_s = 0.5 * step
         keys = graph(now_s, starts_s)
-        sole.look(["/front"] * len(keys), keys, now_s)
+        sole.check_publishers(["/front"] * len(keys), keys, now_s)
         assert bool(sole.problem) is (len(keys) > 1)
     assert sole.problem == ""
 
@@ -78,7 +78,7 @@ class Base:
             if number in alive:
                 scan = dataclasses.replace(self.scanners[number].scan(FAR), stamp_ns=round(now_s * 1e9))
                 self.filter.on_laser_scan(self.topic, scan, PLACE, now_s, now_s)
-            self.filter.on_command(Twist(0.3, 0.0), now_s)
+            self.filter.accept_command(Twist(0.3, 0.0), now_s)
             decision = self.filter.decide(now_s)
             found.add((decision.action, decision.cause))
         return found

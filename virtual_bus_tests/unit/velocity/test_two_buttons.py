@@ -31,7 +31,7 @@ class Base:
         for _ in range(round(seconds / 0.1)):
             self.now_s += 0.1
             self.filter.on_estop(False, self.now_s)
-            self.filter.on_command(twist, self.now_s)
+            self.filter.accept_command(twist, self.now_s)
             decision = self.filter.decide(self.now_s)
         return decision
 

@@ -14,13 +14,13 @@ OUTPUT = Expected("/r1/cmd_vel", STAMPED, None, ("/r1/safety_filter",), alone=Tr
 
 
 def found(expected: Expected, *publishers: Publisher) -> list[str]:
-    return [foreign.sentence for foreign in ForeignWatch([expected]).look({expected.topic: publishers}, 0.0)]
+    return [foreign.sentence for foreign in ForeignWatch([expected]).check_graph({expected.topic: publishers}, 0.0)]
 
 
 def test_named_publishers_and_empty_topics_are_right() -> None:
     assert found(ACTION, Publisher("/r1/drive_distance_server", STAMPED)) == []
     assert found(ACTION) == []
-    assert ForeignWatch([ACTION]).look({}, 0.0) == ()
+    assert ForeignWatch([ACTION]).check_graph({}, 0.0) == ()
 
 
 def test_where_no_node_is_named_anybody_may_publish() -> None:
@@ -48,7 +48,7 @@ def test_the_same_node_twice_on_a_source_is_nothing_wrong() -> None:
 
 def test_another_message_type_is_told_and_disturbs_nobody() -> None:
     watch = ForeignWatch([JOY])
-    (foreign,) = watch.look({JOY.topic: [Publisher("/teleop", PLAIN)]}, 0.0)
+    (foreign,) = watch.check_graph({JOY.topic: [Publisher("/teleop", PLAIN)]}, 0.0)
     assert foreign.problem == f"of type {PLAIN}, which is not received; expected {STAMPED}"
     assert foreign.disturbs("joystick") is False
 
@@ -62,20 +62,20 @@ def test_who_it_disturbs() -> None:
 
 def test_a_publisher_without_a_name_counts_when_it_stays_so() -> None:
     watch, graph = ForeignWatch([OUTPUT]), {OUTPUT.topic: [Publisher("", STAMPED)]}
-    assert watch.look(graph, 10.0) == ()  # just discovered
-    assert watch.look(graph, 10.0 + PATIENCE_S - 0.01) == ()
-    (foreign,) = watch.look(graph, 10.0 + PATIENCE_S)
+    assert watch.check_graph(graph, 10.0) == ()  # just discovered
+    assert watch.check_graph(graph, 10.0 + PATIENCE_S - 0.01) == ()
+    (foreign,) = watch.check_graph(graph, 10.0 + PATIENCE_S)
     assert foreign.sentence == "an unknown node publishes on /r1/cmd_vel: only /r1/safety_filter should"
-    assert watch.look({}, 13.0) == ()
-    assert watch.look(graph, 14.0) == ()  # another one, just discovered
+    assert watch.check_graph({}, 13.0) == ()
+    assert watch.check_graph(graph, 14.0) == ()  # another one, just discovered
 
 
 def test_a_named_one_beside_it_counts_at_once() -> None:
     graph = {OUTPUT.topic: [Publisher("", STAMPED), Publisher("/evil", STAMPED)]}
-    assert [foreign.node for foreign in ForeignWatch([OUTPUT]).look(graph, 0.0)] == ["/evil"]
+    assert [foreign.node for foreign in ForeignWatch([OUTPUT]).check_graph(graph, 0.0)] == ["/evil"]
 
 
 def test_a_nameless_one_is_no_crime_where_anybody_may_publish() -> None:
     watch, graph = ForeignWatch([JOY]), {JOY.topic: [Publisher("", STAMPED)]}
-    assert watch.look(graph, 0.0) == ()
-    assert watch.look(graph, 100.0) == ()
+    assert watch.check_graph(graph, 0.0) == ()
+    assert watch.check_graph(graph, 100.0) == ()

@@ -34,7 +34,7 @@ class Base:
             if self.scans and self.cycle % 5 == 0:
                 see(self.filter, self.now_s, *ahead)
             if commanded:
-                self.filter.on_command(FORWARD, self.now_s)
+                self.filter.accept_command(FORWARD, self.now_s)
             self.causes.add(self.filter.decide(self.now_s).cause)
         return self.filter.without_scans
 
