@@ -248,11 +248,11 @@ def test_an_exception_in_a_callback_ends_the_process_with_zeros_and_the_tracebac
 ) -> None:
     broken = "\n".join((
         "from canbase_velocity.mux import Mux",
-        "taken = Mux.on_command",
-        "def on_command(self, name, twist, *times):",
+        "taken = Mux.accept_command",
+        "def accept_command(self, name, twist, *times):",
         "    if name == 'joystick' and not twist.is_zero: raise RuntimeError('a defect')",
         "    return taken(self, name, twist, *times)",
-        "Mux.on_command = on_command",
+        "Mux.accept_command = accept_command",
         RUN.format(path=str(robot_yaml), ros_args=[]),
     ))  # fmt: skip
     chain = Chain(test_node, spawn(broken), watchdog)
