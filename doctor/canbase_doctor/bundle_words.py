@@ -17,6 +17,7 @@ LEFT_OUT: Final = "…"
 PACKAGES: Final = (
     "canbase_config", "canbase_runtime", "canbase_driver", "canbase_watchdog", "canbase_velocity", "canbase_deploy",
     "canbase_action_server", "canbase_commissioning", "canbase_doctor", "canbase_fleet", "canbase_cli",
+    "canbase_web",
 )  # fmt: skip
 """Whose messages, keys and states are words of a bundle."""
 LONGEST: Final = 2000
