@@ -73,7 +73,7 @@ class Evidence:
     halted_samples: int = 0
     """Samples in a row without any motion after a drop that no wheel can do: rule 2."""
     velocity_jumps: int = 0
-    """Changes of the velocity that no wheel can do, none VELOCITY_JUMP_MEMORY_S after the one before: rule 3."""
+    """Changes of the velocity that no wheel can do, each within VELOCITY_JUMP_MEMORY_S of the last one: rule 3."""
     ghost: Ghost = NO_GHOST
     """Rule 4."""
     behind_s: float = 0.0
