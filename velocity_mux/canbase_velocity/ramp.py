@@ -67,7 +67,11 @@ def _line(start: Twist, end: Twist, limits: Limits) -> tuple[Twist, float]:
     turn, turn_to = start.angular_radps, end.angular_radps
     angular_s = _axis_s(turn, turn_to, limits.angular_acceleration_radps2, limits.angular_deceleration_radps2)
     if _slows(start.linear_mps, end.linear_mps) and angular_s > linear_s and not _slows(turn, turn_to):
-        return Twist(end.linear_mps, _between(start, end, linear_s / angular_s).angular_radps), linear_s
+        turned_to = _between(start, end, linear_s / angular_s).angular_radps
+        if turn * turn_to < 0.0:
+            left_radps = abs(turn) - limits.angular_deceleration_radps2 * linear_s
+            turned_to = math.copysign(max(0.0, left_radps), turn)
+        return Twist(end.linear_mps, turned_to), linear_s
     return end, max(linear_s, angular_s)
 
 
@@ -83,7 +87,9 @@ def _axis_s(velocity: float, goal: float, acceleration: float, deceleration: flo
 
 
 def _waypoint(twist: Twist, order: Twist) -> Twist:
-    """The order, or where the linear velocity is zero on the way to it."""
+    """The order, or where the linear velocity is zero on the way to it; of a turn alone, where the turn is."""
+    if abs(order.linear_mps - twist.linear_mps) <= NEGLIGIBLE_MPS:
+        return Twist(order.linear_mps, 0.0) if twist.angular_radps * order.angular_radps < 0.0 else order
     if twist.linear_mps * order.linear_mps >= 0.0:
         return order
     done = twist.linear_mps / (twist.linear_mps - order.linear_mps)

@@ -63,6 +63,8 @@ def _drop(module: ModuleType, wanted: Callable[[Any], bool]) -> Callable[[], Non
 
 
 def _put(owner: Any, name: str, value: Any) -> Callable[[], None]:
+    if not hasattr(owner, name):
+        raise AttributeError(f"{owner.__name__} has no {name}: its safeguard would not be removed")
     return lambda: setattr(owner, name, value)
 
 
@@ -244,7 +246,7 @@ SAFEGUARDS: dict[str, Callable[[], None]] = {
     "filter:speed_limit": _put(safety_filter, "_lowered", lambda inputs: PASSED),
     "filter:uncommissioned": _put(safety_filter.FilterConfig, "uncommissioned", property(lambda self: "")),
     "filter:blind_mps": _put(safety_filter, "_unseen", lambda inputs, config: []),
-    "filter:scan": _put(safety_filter, "_scan", lambda inputs: None),
+    "filter:scan": _put(safety_filter, "missing_scan", lambda inputs: None),
     "filter:brakes_hard": _put(safety_filter, "brakes_hard", lambda inputs, config: False),
     "mux:lock": _put(lock.Lock, "hear", lambda self, locked, now_s: None),
     "mux:late_commands": _put(mux._Source, "why_late", property(lambda self: "")),

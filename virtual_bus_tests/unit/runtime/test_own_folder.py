@@ -334,7 +334,7 @@ OTHERWISE = {
     "canbase_evidence/gather.py": "a new folder gets its name whole",
     "canbase_evidence/new_folder.py": "files of that folder",
     "canbase_qualification/carry_out.py": "in a temporary folder",
-    "canbase_recording/replay_file.py": "in a temporary folder",
+    "canbase_recording/stop_file.py": "in a temporary folder",
     "canbase_runtime/latch_file.py": "a new folder gets its name whole",
 }
 """Modules that write, or give a name, without `replaced`."""
