@@ -88,12 +88,12 @@ def _axis_s(velocity: float, goal: float, acceleration: float, deceleration: flo
 
 def _waypoint(twist: Twist, order: Twist) -> Twist:
     """The order, or where the linear velocity is zero on the way to it; of a turn alone, where the turn is."""
-    if abs(order.linear_mps - twist.linear_mps) <= NEGLIGIBLE_MPS:
-        return Twist(order.linear_mps, 0.0) if twist.angular_radps * order.angular_radps < 0.0 else order
-    if twist.linear_mps * order.linear_mps >= 0.0:
-        return order
-    done = twist.linear_mps / (twist.linear_mps - order.linear_mps)
-    return Twist(0.0, _between(twist, order, done).angular_radps)
+    if twist.linear_mps * order.linear_mps < 0.0:
+        done = twist.linear_mps / (twist.linear_mps - order.linear_mps)
+        return Twist(0.0, _between(twist, order, done).angular_radps)
+    if abs(order.linear_mps - twist.linear_mps) <= NEGLIGIBLE_MPS and twist.angular_radps * order.angular_radps < 0.0:
+        return Twist(order.linear_mps, 0.0)
+    return order
 
 
 def _between(start: Twist, end: Twist, done: float) -> Twist:

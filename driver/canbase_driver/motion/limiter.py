@@ -154,13 +154,13 @@ def _axis_ramp_s(current: float, goal: float, acceleration: float, deceleration:
 def _waypoint(current: Twist2D, target: Twist2D) -> Twist2D:
     """`target`, or the point on the way to it at which the linear velocity is zero, if it has to change its sign; where
     it does not change at all, that at which the turn is."""
-    if abs(target.linear_mps - current.linear_mps) <= NEGLIGIBLE_MPS:
-        reverses = current.angular_radps * target.angular_radps < 0.0
-        return Twist2D(target.linear_mps, 0.0) if reverses else target
-    if current.linear_mps * target.linear_mps >= 0.0:
-        return target
-    done = current.linear_mps / (current.linear_mps - target.linear_mps)
-    return Twist2D(0.0, _between(current, target, done).angular_radps)
+    if current.linear_mps * target.linear_mps < 0.0:
+        done = current.linear_mps / (current.linear_mps - target.linear_mps)
+        return Twist2D(0.0, _between(current, target, done).angular_radps)
+    straight = abs(target.linear_mps - current.linear_mps) <= NEGLIGIBLE_MPS
+    if straight and current.angular_radps * target.angular_radps < 0.0:
+        return Twist2D(target.linear_mps, 0.0)
+    return target
 
 
 def _between(start: Twist2D, end: Twist2D, done: float) -> Twist2D:

@@ -113,6 +113,7 @@ def test_the_ramp_depends_on_the_time_and_not_on_how_it_was_cut(cuts_s: list[flo
         (Twist2D.ZERO, Twist2D(0.0, 2.0), 1.0),  # 2.0 / 2.0
         (Twist2D(0.0, -2.0), Twist2D.ZERO, 0.5),  # 2.0 / 4.0
         (Twist2D(0.0, 1.0), Twist2D(0.0, -1.0), 0.75),  # a turn brakes first: 1.0 / 4.0 + 1.0 / 2.0
+        (Twist2D(0.5, 1.0), Twist2D(0.5, -1.0), 0.75),
         (Twist2D(0.1, 2.0), Twist2D(0.0, -2.0), 1.5),  # beside the brake too: 0.1 / 1.0 + 1.6 / 4.0 + 2.0 / 2.0
         (Twist2D.ZERO, Twist2D(0.1, 1.0), 0.5),  # the turn is the slower one: 1.0 / 2.0 against 0.1 / 0.5
         (Twist2D(0.1, 2.0), Twist2D.ZERO, 0.5),  # 2.0 / 4.0 against 0.1 / 1.0
