@@ -77,7 +77,12 @@ def _footprint(side: str, waits_for: str, rule: str, least: Callable[[Robot], fl
 
 def _increments_m(robot: Robot, number: float) -> float:
     """Travel of the rim with the coarsest encoder for so many increments [m]."""
-    return number * max(abs(m_per_count(drive, robot.base.radius_m(drive.side))) for drive in robot.drives)
+    return number * max(_increment_m(robot, place) for place in range(len(robot.drives)))
+
+
+def _increment_m(robot: Robot, place: int) -> float:
+    drive = robot.drives[place]
+    return abs(m_per_count(drive, robot.base.radius_m(drive.side)))
 
 
 def _commands_s(robot: Robot) -> float:
@@ -92,6 +97,7 @@ _COMMANDS: Final = f"2 / rates.command_hz + {TOPIC_LATE_S:g}"
 _CYCLES: Final = f"4 / rates.control_hz + {FEEDBACK_LATE_S:g}"
 _INCREMENT: Final = "2π × base.wheel_radius_m / (drives.gear_ratio × drives.counts_per_motor_rev)"
 COUNTS: Final = "drives.counts_per_motor_rev"
+GEAR: Final = "drives.gear_ratio"
 
 RESERVES: Final = (
     _row("timeouts.command_s", "cmd_vel at the driver", _COMMANDS, ("rates.command_hz",), _commands_s),
@@ -147,14 +153,14 @@ RESERVES: Final = (
         "watchdog.travel_tolerance_m",
         "the encoder beside the measured velocity",
         f"{COUNTS_PER_TRAVEL:g} increments of the coarsest encoder, each {_INCREMENT}",
-        (COUNTS,),
+        (COUNTS, GEAR),
         lambda robot: _increments_m(robot, COUNTS_PER_TRAVEL),
     ),
     _row(
         "watchdog.motion_missing_m",
         "the first sign of life of an encoder that turns",
         f"{COUNTS_OF_LIFE:g} increments of the coarsest encoder",
-        (COUNTS,),
+        (COUNTS, GEAR),
         lambda robot: _increments_m(robot, COUNTS_OF_LIFE),
     ),
     *(
@@ -214,7 +220,7 @@ def check(robot: Robot) -> None:
         for loc in row.keys(robot):
             given = at(robot, loc)
             if given < least - ROUNDING:
-                raise MisfitError(_sentence(row, given, least), loc, *_locs(row))
+                raise MisfitError(_sentence(row, given, least), loc, *_locs(row, robot))
 
 
 def _sentence(row: Reserve, given: float, least: float) -> str:
@@ -224,10 +230,11 @@ def _sentence(row: Reserve, given: float, least: float) -> str:
     )
 
 
-def _locs(row: Reserve) -> list[Loc]:
-    """Where else the file may have what is wrong: the key itself may be a default."""
-    drive = {COUNTS: ("drives", 0, COUNTS.removeprefix("drives."))}
-    return [drive.get(other, tuple(other.split("."))) for other in row.others]
+def _locs(row: Reserve, robot: Robot) -> list[Loc]:
+    """Where else the file may have what is wrong: the key itself may be a default. Of the drives, the coarsest one."""
+    coarsest = max(range(len(robot.drives)), key=lambda place: _increment_m(robot, place))
+    parts = [other.split(".") for other in row.others]
+    return [("drives", coarsest, *keys) if first == "drives" else (first, *keys) for first, *keys in parts]
 
 
 def rounded_up(value: float) -> float:

@@ -15,7 +15,7 @@ from canbase_config.load import load_robot
 from canbase_deploy.keystore import KEYS, found_in, refusals
 from canbase_deploy.neighbours import Neighbour
 from canbase_deploy.owner import ETC, owner_paths
-from canbase_deploy.ownership import faults, refusal
+from canbase_deploy.ownership import HOMES, faults, refusal
 from canbase_deploy.plan import PARTS, InstallError, service
 from canbase_runtime.environment_file import variables
 
@@ -24,8 +24,7 @@ SOURCED: Final = (*PATHS, "ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION")
 """What a sourced ROS 2 workspace puts into the environment and a process needs to find it."""
 CHOSEN: Final = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION")
 """What the user may have chosen; it goes along where it is set."""
-
-HIDDEN: Final = ("/home/", "/root/", "/run/user/", "/tmp/", "/var/tmp/")
+HIDDEN: Final = (*HOMES, "/run/user/", "/tmp/", "/var/tmp/")
 """What the units cannot see, by ProtectHome and PrivateTmp."""
 UNCHANGED: Final = "Nothing was changed: what is installed goes on as it is."
 REHEARSAL_S: Final = 120.0

@@ -24,6 +24,8 @@ MOST_LINKS: Final = 40
 NFS4_ACL: Final = "system.nfs4_acl"
 ACLS: Final = ("system.posix_acl_", NFS4_ACL)
 """Extended attributes: lists of a file and default ones of a folder (acl(5)); lists of NFSv4, which ZFS has too."""
+HOMES: Final = ("/home/", "/root/")
+"""Nobody shall give his home to root: the units cannot see it anyway, by ProtectHome."""
 TOLD: Final = 3
 """So many faults are named; the cure of one is often that of all."""
 
@@ -45,6 +47,8 @@ class Fault:
     def cure(self) -> str:
         """The command. NFSv4: a mount whose server has lists shows one for every file, `chmod` and nfs4_setfacl(1) only
         replace it, and what it gives is for the server to say."""
+        if f"{self.path}/".startswith(HOMES):
+            return "install into /opt/canbase: the services see nothing below this folder (docs/install.md)"
         deep = "-R " if self.is_deep else ""
         if self.acl.startswith(NFS4_ACL):
             return "install on a disk of this computer: no command removes the lists of NFSv4"

@@ -9,10 +9,12 @@ from typing import Final
 
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301.nmt import TPDO
+from canbase_driver.supervision.watchdog_link import WATCHING
 from canbase_recording.beat import Beat
 from canbase_recording.cause import Found
+from canbase_recording.frame_words import QUICK_STOP_COB_ID
 from canbase_recording.scene import Scene
-from canbase_recording.trace import Line, first_after, last_before, times_between
+from canbase_recording.trace import Line, first_after, last_before, times_between, value_at
 
 LOST_PERIODS: Final = 4.0
 """So many periods without it are no lost frame."""
@@ -22,6 +24,8 @@ TOGETHER_S: Final = 0.05
 LOOKS_AHEAD_S: Final = 1.0
 """What comes so much later tells whether a node lives [s]."""
 PAUSE_S: Final = 0.12
+ENDED_S: Final = {DRIVER_NODE_ID: 0.1, WATCHDOG_NODE_ID: 0.25}
+"""A part whose SYNC or state frame has not come for so long, while its stop process acts, does not run any more."""
 SIGNS: Final = 3
 _RESETS: Final = (0x81, 0x82)
 _RECEIVES_NOTHING: Final = (0x8130, 0x8250, 0x8120, 0x8140)
@@ -60,7 +64,26 @@ def node_restarted(scene: Scene) -> Found | None:
 
 
 def driver_silent(scene: Scene) -> Found | None:
-    """SYNC ends, and the master's heartbeat with it, while others go on."""
+    """SYNC ends, and the heartbeat of the master, while others go on; or it was killed, and its stop process acts."""
+    return _killed(scene, scene.syncs, "canbase's driver sends no SYNC", DRIVER_NODE_ID) or _driver_missing(scene)
+
+
+def _killed(scene: Scene, own: list[float], what: str, node_id: int) -> Found | None:
+    """Quick stops on the PDO of a watchdog that watches, and nothing of a part's `own` frames from then on: its stop
+    process sends them, which outlives it (docs/safety.md)."""
+    stops = [at for node in scene.drive_nodes for at in scene.pdo_times.get(QUICK_STOP_COB_ID + node, ())]
+    at_s = first_after(sorted(stops), scene.reaction_s - TOGETHER_S)
+    watched, last_s = value_at(scene.watchdog, at_s), last_before(own, at_s)
+    acts = at_s <= scene.reaction_s + TOGETHER_S and watched is not None and watched.state == WATCHING
+    ended_s = ENDED_S[node_id]
+    alive = bool(times_between(own, at_s, at_s + ended_s)) or scene.ended_s < at_s + ended_s
+    if not acts or alive or last_s < at_s - ended_s:
+        return None
+    text = f"{what} after {last_s:.3f} s, and its stop process acts: it was killed, or it crashed"
+    return Found(last_s, text, node_id)
+
+
+def _driver_missing(scene: Scene) -> Found | None:
     period_s, syncs = scene.period_s, scene.syncs
     if len(syncs) < SIGNS or scene.silence_s(syncs) < max(LEAST_SILENCE_S, LOST_PERIODS * period_s):
         return None
@@ -81,7 +104,12 @@ def driver_silent(scene: Scene) -> Found | None:
 
 
 def watchdog_silent(scene: Scene) -> Found | None:
-    """The watchdog's state frame and heartbeat end, while SYNC goes on."""
+    """The watchdog's state frame and heartbeat end, while SYNC goes on; or it was killed, and its stop process acts."""
+    own = scene.node_times.get(WATCHDOG_NODE_ID, [])
+    return _killed(scene, own, "canbase's watchdog sends nothing", WATCHDOG_NODE_ID) or _watchdog_missing(scene)
+
+
+def _watchdog_missing(scene: Scene) -> Found | None:
     beat = _beat([at for at, _ in scene.watchdog], scene.reaction_s)
     if not beat.is_missing(scene.reaction_s) or scene.silence_s(scene.syncs) > LOST_PERIODS * scene.period_s:
         return None

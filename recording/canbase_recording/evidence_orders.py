@@ -13,6 +13,7 @@ from canbase_recording.cause import Found
 from canbase_recording.notes import FilterNote
 from canbase_recording.scene import Scene
 from canbase_recording.trace import last_before, value_at
+from canbase_runtime.driver_state import DriverState
 from canbase_runtime.stop_cause import SCAN_LOST, StopCause
 
 Seen = Callable[[Scene], Found | None]
@@ -53,10 +54,12 @@ def _first_hold(scene: Scene) -> FilterNote | None:
 
 
 def source_lost(scene: Scene) -> Found | None:
-    """The mux has no source any more, while the last one ordered motion."""
+    """The mux has no source any more, while the last one ordered motion; after a stop of the driver it ends by that."""
+    stops = (note.at_s for note in scene.drivers if note.state in (DriverState.STOPPING, DriverState.LATCHED))
+    stopped_s = next((at_s for at_s in stops if at_s >= scene.reaction_s - SLACK_S), math.inf)
     before = ""
     for note in scene.muxes:
-        if note.at_s > scene.reaction_s + SLACK_S:
+        if note.at_s > scene.reaction_s + SLACK_S or note.at_s >= stopped_s:
             break
         if not note.active and before and note.at_s >= scene.reaction_s - SLACK_S:
             return Found(note.at_s, f"velocity_mux follows {before} no longer: {note.detail or 'no source'}")

@@ -37,6 +37,8 @@ from canbase_recording.pdo_layouts import Mapped, PdoLayout, PdoLayouts, Source
 from canbase_recording.sdo_words import sdo_address, sdo_words
 
 SYNC: Final = 0x080
+QUICK_STOP_COB_ID: Final = 0x500
+"""And a node id: RPDO4, which beside canbase's watchdog is its own (docs/bus.md)."""
 TIME: Final = 0x100
 LSS_ANSWER: Final = 0x7E4
 NMT_COMMANDS: Final = {

@@ -14,14 +14,23 @@ from canbase_config.bus_load import frame_bits
 from canbase_config.object_map import CONTROLWORD, STATUSWORD
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301.frame import MAX_COB_ID, Frame
-from canbase_driver.cia301.nmt import EMCY, HEARTBEAT, NMT, SDO_TO_CLIENT, SDO_TO_SERVER, NmtState
+from canbase_driver.cia301.nmt import EMCY, HEARTBEAT, NMT, SDO_TO_CLIENT, SDO_TO_SERVER, NmtCommand, NmtState
 from canbase_driver.cia301.sdo_client import abort_text
-from canbase_driver.supervision.watchdog_link import RUNGS, STATE_COB_ID, TRIPPED, WATCHING, WatchdogState, parse_state
+from canbase_driver.supervision.watchdog_link import (
+    COUNTERS_COB_ID,
+    RESET_COB_ID,
+    RUNGS,
+    STATE_COB_ID,
+    TRIPPED,
+    WATCHING,
+    WatchdogState,
+    parse_state,
+)
 from canbase_recording.axis_events import HALTED_S, OnWord, on_controlword, on_statusword, on_watchdog_word
 from canbase_recording.beat import Beat
 from canbase_recording.entry import FrameKind, RecordedFrame
 from canbase_recording.event import Event, EventKind, Level
-from canbase_recording.frame_words import SYNC, Decoder, nmt_state, nmt_text
+from canbase_recording.frame_words import QUICK_STOP_COB_ID, SYNC, Decoder, nmt_state, nmt_text
 from canbase_recording.load_series import LoadSeries
 from canbase_recording.node_seen import NodeSeen
 from canbase_recording.pdo_layouts import PdoLayouts
@@ -29,13 +38,13 @@ from canbase_recording.sdo_words import SdoChannels, SdoDone
 
 LOOK_S: Final = 0.02
 """Between two looks for what is missing."""
-QUICK_STOP_RPDO: Final = 0x500
-"""Beside canbase's watchdog this PDO is its own (docs/bus.md)."""
 MOST_UNKNOWN: Final = 500
 MOST_ABORTS: Final = 200
 """Different ones of a node that are counted apart."""
 NONE: Final[Sequence[Event]] = ()
 _STOPPING_COMMANDS: Final = (0x02, 0x80, 0x81, 0x82)
+_LADDER_COMMANDS: Final = (NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.RESET_NODE)
+"""Of canbase's watchdog (docs/bus.md). What starts a node, or resets its communication, is the boot of the driver."""
 """NMT: stop, pre-operational, the two resets."""
 
 
@@ -127,7 +136,7 @@ class Network:
         if len(data) != 2:
             return NONE
         hit = [node for node in self.nodes.values() if data[1] in (0, node.node_id)]
-        if self._watchdog_stops(at_s):
+        if data[0] in _LADDER_COMMANDS and self._watchdog_stops(at_s):
             return [
                 Event(at_s, EventKind.NMT_COMMAND, Level.INFO, "watchdog", f"its ladder: {nmt_text(data)}", data[1])
             ]
@@ -227,13 +236,15 @@ class Network:
 
     def _on_pdo(self, at_s: float, cob_id: int, data: bytes) -> Sequence[Event]:
         self.kinds["PDO"] += 1
+        if self.watchdog is not None and cob_id in (COUNTERS_COB_ID, RESET_COB_ID):
+            return NONE
         layout = self._layouts.of(cob_id, len(data))
         if layout is None or not layout.fits(len(data)):
             if len(self.unknown_pdos) < MOST_UNKNOWN or (cob_id, len(data)) in self.unknown_pdos:
                 self.unknown_pdos[cob_id, len(data)] += 1
             return NONE
         node = self._seen(layout.node_id, at_s) if layout.name[0] == "T" else self._known(layout.node_id, at_s)
-        is_watchdog = self.watchdog is not None and cob_id & 0x780 == QUICK_STOP_RPDO
+        is_watchdog = self.watchdog is not None and cob_id & 0x780 == QUICK_STOP_COB_ID
         on_command = on_watchdog_word if is_watchdog else on_controlword
         events: Sequence[Event] = NONE
         for mapped in layout.mapped:

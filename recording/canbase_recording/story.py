@@ -5,11 +5,13 @@ The table RULES is what this package is for. How it is read:
 2. Rows stand in the order of cause and effect: who orders a stop comes before what breaks, the bus before the drives on
    it, the drives before what their sensors show, and what parts report without anything to be seen comes last.
 3. The first row that has evidence names the first cause. Other rows that have evidence too are reported beside it.
-4. No evidence is not "nothing": the story says "reported only", or "cannot tell".
+4. No evidence is not "nothing": the story says "reported only", or "cannot tell". What has no time in the recording is
+   no evidence: before its first sample nothing can be seen to end.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -116,7 +118,8 @@ class Story:
 
 def tell(scene: Scene) -> Story:
     """The story of one stop."""
-    seen = [(rule.cause, found) for rule in RULES if (found := rule.seen(scene)) is not None]
+    evidence = ((rule.cause, rule.seen(scene)) for rule in RULES)
+    seen = [(cause, found) for cause, found in evidence if found is not None and math.isfinite(found.at_s)]
     cause, found = seen[0] if seen else _unknown(scene)
     chain = tuple(event for event in scene.events if event.at_s >= found.at_s - BEFORE_S)
     caught_by, reported = _catcher(scene, chain)

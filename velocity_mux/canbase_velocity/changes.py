@@ -41,7 +41,8 @@ def changes(before: MuxDecision, now: MuxDecision) -> Iterator[LogLine]:
         lost = next((source for source in now.sources if source.name == before.active), None)
         why = f" ({lost.reason})" if lost is not None and lost.reason else ""
         locked = lost is not None and lost.standing is SourceStanding.LOCKED
-        sentence = f"{now.sentence}; before: {before.active or 'none'}{why}"
+        other = now.active != before.active
+        sentence = f"{now.sentence}; before: {before.active or 'none'}{why}" if other else now.sentence
         fields = {"active": now.active or "", "before": before.active or ""}
         yield sentence, Priority.NOTICE if locked else Priority.INFO, fields
 

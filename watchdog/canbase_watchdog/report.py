@@ -31,6 +31,8 @@ class Reporter:
         self._status: Status | None = None
         self._counters: dict[str, int] = {}
         self._counters_due = self._alive_due = 0.0
+        self._stood = False
+        """That all drives stand is reported once for each trip: drives may be lost and found again until the reset."""
 
     def tick(self, health: BusHealth, now_s: float, datagrams_dropped: int = 0) -> None:
         """Report what changed. systemd learns that the loop turns, also on a bus that takes no frames."""
@@ -50,6 +52,11 @@ class Reporter:
             notify(f"STATUS={text}")
         if status.state is State.TRIPPED and old is not None:
             _log_ladder(old, status)
+            if status.settled and not old.settled and not self._stood:
+                _log.warning(ASSUMED if status.assumed else "all drives at standstill")
+                self._stood = True
+        if status.state is not State.TRIPPED:
+            self._stood = False
         number, answer = status.reset
         if answer is not Answer.NONE and (old is None or old.reset != status.reset):
             _log.info("reset request %d: %s", number, _words(answer))
@@ -79,8 +86,6 @@ def _log_ladder(old: Status, status: Status) -> None:
         _log.warning("ladder: %s", _words(status.step))
     if status.unproven and status.unproven != old.unproven:
         _log.warning(UNPROVEN, status.unproven)
-    if status.settled and not old.settled:
-        _log.warning(ASSUMED if status.assumed else "all drives at standstill")
 
 
 def _state_line(status: Status) -> str:

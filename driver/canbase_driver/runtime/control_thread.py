@@ -100,7 +100,7 @@ class ControlLoop(threading.Thread):
 
         def carry_out(_now: float, answer: OnOutcome) -> None:
             self._core.request_stop()
-            answer(RequestOutcome(True, "stopping; nothing moves until motor_driver/reset"))
+            answer(RequestOutcome(True, "stopping; nothing moves until `canbase reset`, or motor_driver/reset"))
 
         self._ask("stop", carry_out, on_outcome, however_late=True)
 

@@ -119,7 +119,8 @@ class Reset:
 
     def _watchdog(self, situation: Situation, answer: int | None, now_s: float) -> RequestOutcome | None:
         if answer is not None and answer not in ACCEPTED:
-            return RequestOutcome(False, f"the watchdog refused: {ANSWERS.get(answer, f'answer {answer}')}")
+            about = f" ({situation.watchdog_detail})" if situation.watchdog_detail else ""
+            return RequestOutcome(False, f"the watchdog{about} refused: {ANSWERS.get(answer, f'answer {answer}')}")
         if answer is not None and situation.watchdog is WatchdogView.OK:
             self._go(ResetPhase.DRIVES, now_s)
         elif now_s - self._since_s > WATCHDOG_TIMEOUT_S:

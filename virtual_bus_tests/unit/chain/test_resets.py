@@ -115,7 +115,7 @@ def test_while_a_silent_drive_is_the_watchdogs_cause_its_reset_is_refused(world:
     world.run(2.5)
     outcome = world.reset()
     assert not outcome.done
-    assert outcome.sentence.startswith("the watchdog refused: its cause persists")
+    assert "refused: its cause persists" in outcome.sentence
 
 
 def test_a_drive_that_restarts_during_a_reset_breaks_it_off(world: World) -> None:
@@ -191,7 +191,7 @@ def test_after_a_lost_lease_the_watchdog_is_reset_only_when_zero_is_ordered(worl
     world.command = None  # cmd_vel ends, but the filter goes on to order 0.3 m/s
     world.run(0.3)
     outcome = world.reset()
-    assert outcome.sentence == f"the watchdog refused: {ANSWERS[3]}"
+    assert outcome.sentence.endswith(f" refused: {ANSWERS[3]}")
     assert world.core.state is DriverState.LATCHED
     assert world.recovered()
     assert world.watchdog is not None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
 from canbase_campaign.robots import EDGES, at_edges, draw_robot
-from canbase_config.errors import Loc
+from canbase_config.errors import ConfigError, Loc
 from canbase_config.load import load_robot, sample
 from canbase_config.profile_file import PROFILE_SCHEMA
 from canbase_config.reserves import COUNTS, RESERVES, WITHOUT_RESERVE, Reserve, at, rounded_up
@@ -121,6 +122,19 @@ def test_encoders_of_twelve_increments_on_a_wheel_without_gear_are_refused_with_
 
     with pytest.raises(ValidationError, match=r"travel_tolerance_m \(0.05\) is too little .* at least 0\.\d+"):
         Robot.model_validate(values)
+
+
+def test_the_drive_that_is_named_is_the_one_with_the_coarsest_encoder(tmp_path: Path) -> None:
+    """Its gear ratio is wrong, and stands in the second of two drives."""
+    file = tmp_path / "robot.yaml"
+    first, second = "gear_ratio: 20.0              #", "gear_ratio: 20.0\n"
+    text = sample("bench").read_text(encoding="utf-8")
+    assert first in text
+    assert text.count(second) == 1
+    file.write_text(text.replace(second, "gear_ratio: 0.085\n"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"drives\[1\]\.(counts_per_motor_rev|gear_ratio): ") as told:
+        load_robot(file)
+    assert "or change drives.counts_per_motor_rev or drives.gear_ratio" in str(told.value)
 
 
 def test_a_footprint_that_leaves_a_wheel_out_is_refused_but_for_a_base_that_skids() -> None:

@@ -137,6 +137,11 @@ def test_a_tree_of_a_user_is_told_once_with_its_cure(tree: Path) -> None:
     assert cure == "sudo chown -R root:root /opt/canbase && sudo chmod -R go-w /opt/canbase"
 
 
+@pytest.mark.parametrize("path", ["/home/me", "/home/me/canbase", "/root"])
+def test_nobody_gives_a_home_to_root(path: str) -> None:
+    assert Fault(path, "belongs to the user me").cure().startswith("install into /opt/canbase: ")
+
+
 def test_what_one_cure_cures_is_told_once(tree: Path) -> None:
     tree.chmod(0o777)
     for path in tree.rglob("*"):

@@ -128,7 +128,7 @@ def test_with_nothing_else_wrong_it_is_done_two_cycles_after_the_watchdogs_answe
     ],
 )
 def test_what_the_watchdog_refuses_is_refused(answer: int, why: str) -> None:
-    assert sentence(Story().run(TRIPPED, 0.01, answer)) == f"the watchdog refused: {why}"
+    assert sentence(Story().run(TRIPPED, 0.01, answer)) == f"the watchdog (lease lost) refused: {why}"
 
 
 @pytest.mark.parametrize(

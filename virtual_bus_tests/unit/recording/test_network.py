@@ -135,6 +135,20 @@ def test_an_nmt_command_of_the_master_is_the_cause_where_drives_have_power() -> 
     assert story.found.text == "somebody sent NMT stop, all nodes, while a drive had power"
 
 
+def test_the_boot_of_the_driver_is_no_ladder_of_a_tripped_watchdog() -> None:
+    """Its ladder resets node 1; then the driver resets its communication, and starts it. 2FEh, 27Eh are known."""
+    nmt = [RecordedFrame(0.1 * at, 0x000, bytes(data)) for at, data in enumerate(((129, 1), (130, 1), (1, 1)), 1)]
+    own = [RecordedFrame(0.5, 0x2FE, bytes(8)), RecordedFrame(0.6, 0x27E, bytes(4))]
+    told = explain([RecordedFrame(0.0, 0x1FE, b"\x02\x03\x00\x01\x05\x00\x00\x00"), *nmt, *own])
+    commands = [(event.who, event.text) for event in told.events if event.kind is EventKind.NMT_COMMAND]
+    assert commands == [
+        ("watchdog", "its ladder: NMT reset node, node 1"),
+        ("NMT master", "NMT reset communication, node 1"),
+        ("NMT master", "NMT start, node 1"),
+    ]
+    assert gaps(told) == []
+
+
 def test_a_heartbeat_that_pauses_and_comes_back_stops_nothing_and_is_told() -> None:
     frames = [RecordedFrame(0.1 * i, 0x705, b"\x05") for i in range(40) if not 20 <= i < 30]
     told = explain(frames)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import struct
 from random import Random
 
@@ -13,10 +14,11 @@ from canbase_campaign.outside import Surroundings
 from canbase_campaign.robots import campaign_robot
 from canbase_campaign.twins import JOYSTICK, Begin, Twin, fault
 from canbase_campaign.world import World
-from canbase_recording.cause import ADVICE, Cause
+from canbase_driver.runtime import black_box_notes as written
+from canbase_recording.cause import ADVICE, Cause, Found
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.explanation import Explanation, explain
-from canbase_recording.story import RULES
+from canbase_recording.story import RULES, Rule
 from canbase_velocity.twist import Twist
 from support.recorded_world import WorldRecorder, recorded, twin
 
@@ -191,6 +193,47 @@ def test_the_time_of_the_cause_is_that_of_the_last_frame_not_of_the_alarm() -> N
     )
     assert story.found.at_s == pytest.approx(last_s, abs=0.002)
     assert story.scene.reaction_s == pytest.approx(story.found.at_s + ROBOT.timeouts.feedback_s, abs=0.03)
+
+
+@pytest.mark.parametrize(("part", "own", "cause"), [
+    ("motor_driver", 0x080, Cause.DRIVER_SILENT), ("watchdog", 0x1FE, Cause.WATCHDOG_SILENT),
+])  # fmt: skip
+def test_a_part_that_was_killed_is_named_when_its_stop_process_acts_before_it_is_missed(
+    part: str, own: int, cause: Cause
+) -> None:
+    """Its last frame, 30 ms later quick stop thrice on the watchdog's PDO, and pre-operational: not missed yet."""
+    wire = recorder(part, "SIGKILL").wire
+    last_s = max(entry.at_s for entry in wire if isinstance(entry, RecordedFrame) and entry.cob_id == own)
+    stops = [
+        RecordedFrame(last_s + 0.03 + 0.01 * turn, 0x500 + drive.node_id, b"\x02\x00")
+        for turn in range(3) for drive in ROBOT.drives
+    ]  # fmt: skip
+    ends = [RecordedFrame(last_s + 0.06, 0x000, bytes((0x80, drive.node_id))) for drive in ROBOT.drives]
+    story = explain(sorted((*wire, *stops, *ends), key=lambda entry: entry.at_s), ROBOT).stories[0]
+    assert story.cause is cause
+    assert story.found.at_s == pytest.approx(last_s)
+    assert story.found.text.endswith("and its stop process acts: it was killed, or it crashed")
+
+
+@pytest.mark.parametrize(("lost_s", "cause"), [(0.999, Cause.SOURCE_LOST), (1.004, Cause.STOP_REQUESTED)])
+def test_a_source_that_ends_after_the_stop_is_not_its_cause(lost_s: float, cause: Cause) -> None:
+    """At 1 s somebody requests a stop, and 4 ms later the goal has ended by it."""
+    notes = [
+        Note(0.0, "motor_driver ENABLED"),
+        Note(0.1, written.mux_note("action", "")),
+        Note(0.9, written.command_note(0.3, 0.0)),
+        Note(lost_s, written.mux_note("", "action: its goal has ended")),
+        Note(1.0, written.driver_note("STOPPING: stop requested")),
+    ]
+    (story,) = explain(sorted(notes, key=lambda note: note.at_s), ROBOT).stories
+    assert story.cause is cause
+
+
+def test_what_has_no_time_in_the_recording_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The recording begins after the last SYNC: nobody knows when it ended."""
+    ended = Rule(Cause.DRIVER_SILENT, lambda scene: Found(-math.inf, "SYNC ends at -inf s"))
+    monkeypatch.setattr("canbase_recording.story.RULES", (ended, *RULES))
+    assert explain(recorder("drive", "in fault").wire, ROBOT).stories[0].cause is Cause.DRIVE_FAULT
 
 
 def test_the_end_of_a_recording_in_motion_is_said() -> None:
