@@ -191,7 +191,7 @@ def tells_all_that_was_ordered_and_what_became_of_it(events: list[dict[str, Any]
 
 def is_decided_again_by_all_parts(robot: RunningRobot, file: Path, since_s: float, cause: str) -> None:
     """A stop since then (s since 1970): mux and filter decide the same from their file, all parts from both files."""
-    velocity = written(robot, "velocity_*.jsonl", since_s)
+    velocity = written(robot, f"velocity_*_{cause}.jsonl", since_s)
     inputs = read_velocity(velocity)
     assert inputs.head.cause == cause
     found = replay_velocity(inputs)
