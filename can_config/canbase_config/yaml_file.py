@@ -110,7 +110,9 @@ def _neighbour(path: Path) -> str:
         return f"the folder {path.parent} does not exist either"
     names = [file.name for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")]
     near = difflib.get_close_matches(path.name, names, n=1)
-    return f"did you mean {path.with_name(near[0])}?" if near else f"looked for it at {path.absolute()}"
+    if near:
+        return f"did you mean {path.with_name(near[0])}?"
+    return f"looked for it at {path.absolute()}; canbase setup init writes a robot.yaml"
 
 
 def _lines(node: Node, loc: Loc = ()) -> Iterator[tuple[Loc, int]]:

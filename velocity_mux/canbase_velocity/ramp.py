@@ -17,6 +17,8 @@ from canbase_velocity.twist import ZERO, Twist
 
 NEGLIGIBLE_MPS = 1e-9
 """A change of the linear velocity below this needs no jerk limit [m/s]."""
+RESIDUE = 1e-14
+"""What rounding leaves of a velocity that has become zero [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,8 @@ def follow(moving: Moving, order: Twist, limits: Limits, dt_s: float) -> Moving:
         done = gained_mps / distance_mps
     if done >= 1.0:
         return Moving(goal)
-    return Moving(_between(twist, goal, done), math.copysign(slope_mps2, change_mps))
+    reached = _without_residue(_between(twist, goal, done))
+    return Moving(goal) if reached == goal else Moving(reached, math.copysign(slope_mps2, change_mps))
 
 
 def stop_way_s(moving: Moving, limits: Limits) -> float:
@@ -102,6 +105,11 @@ def _between(start: Twist, end: Twist, done: float) -> Twist:
         end.linear_mps + left * (start.linear_mps - end.linear_mps),
         end.angular_radps + left * (start.angular_radps - end.angular_radps),
     )
+
+
+def _without_residue(twist: Twist) -> Twist:
+    linear, angular = (value if abs(value) > RESIDUE else 0.0 for value in (twist.linear_mps, twist.angular_radps))
+    return Twist(linear, angular)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,8 @@ LONGEST_RAMP_STEP_S = 0.1
 """A step after a longer gap counts as this long [s]: a late cycle must not become a jump of the setpoint."""
 NEGLIGIBLE_MPS = 1e-9
 """A change of the linear velocity below this needs no jerk limit [m/s]."""
+RESIDUE = 1e-14
+"""What rounding leaves of a velocity that has become zero [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,10 @@ class Limiter:
             done = gained_mps / distance_mps
         if done >= 1.0:
             return MotionState(goal)
-        return MotionState(_between(current.twist, goal, done), math.copysign(slope_mps2, change_mps), emergency)
+        twist = _without_residue(_between(current.twist, goal, done))
+        if twist == goal:
+            return MotionState(goal)
+        return MotionState(twist, math.copysign(slope_mps2, change_mps), emergency)
 
     def _pace(self, current: Twist2D, goal: Twist2D, emergency: bool) -> tuple[Twist2D, float]:
         """Where the straight line from `current` ends, and the time for it without a jerk limit [s].
@@ -169,6 +174,14 @@ def _between(start: Twist2D, end: Twist2D, done: float) -> Twist2D:
     return Twist2D(
         end.linear_mps + left * (start.linear_mps - end.linear_mps),
         end.angular_radps + left * (start.angular_radps - end.angular_radps),
+    )
+
+
+def _without_residue(twist: Twist2D) -> Twist2D:
+    """A velocity that is zero but for rounding is zero: else the next step would be needed to end at it."""
+    return Twist2D(
+        twist.linear_mps if abs(twist.linear_mps) > RESIDUE else 0.0,
+        twist.angular_radps if abs(twist.angular_radps) > RESIDUE else 0.0,
     )
 
 

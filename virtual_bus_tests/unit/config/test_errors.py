@@ -358,10 +358,10 @@ def test_a_folder_instead_of_a_file(tmp_path: Path) -> None:
 
 
 def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_: Path, _mode: str) -> None:
+    def refuse(_: Path, _flags: int) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr("canbase_config.bounded_file.os.open", refuse)
 
     with pytest.raises(ConfigError, match="cannot be read: Permission denied"):
         load_robot(tmp_path / "robot.yaml")

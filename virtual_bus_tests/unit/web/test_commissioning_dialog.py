@@ -170,7 +170,8 @@ def test_the_real_command_refuses_a_robot_yaml_that_is_not_there_in_words(tmp_pa
     dialog = CommissioningDialog()
     asyncio.run(dialog.run("setup", "commission", "--config", str(tmp_path / "none.yaml")))
     assert dialog.ended == "ended with exit code 2"
-    assert any("canbase setup init writes one" in text and loud for text, loud in dialog.told)
+    assert any("canbase setup init writes a robot.yaml" in text for text, _ in dialog.told)
+    assert dialog.told[-1][1], "what ended it is loud"
 
 
 def test_a_line_without_an_end_ends_the_process_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
