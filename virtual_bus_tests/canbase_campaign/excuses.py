@@ -82,6 +82,11 @@ EXCUSES = {
         math.inf,
     ),
     "unheard button": Excuse("a filter that never received the button knows of no emergency stop", math.inf),
+    "sped up": Excuse(
+        "behind an old scan the base became faster than there was room for when the wall came: the filter knows the "
+        "world of then until it notices",
+        5.0,
+    ),
     "turned away": Excuse("what was ahead of a base that has turned by 20° is beside it", math.inf),
     "creeps": Excuse("where the scanner says that it sees nothing, the base may creep and so touch what is there",
                      math.inf),

@@ -80,6 +80,7 @@ class Judge:
         self._start = now_s = world.clock.now_s
         self.violations: list[Violation] = []
         self.ledger, self._active = Ledger(), Active()
+        self._sped_up = False
         self._one_s, self._max_wheel_mps = react_s(world.robot, layers=1), max_wheel_mps(world.robot)
         self.react_s = self._one_s
         """Of the layers that the faults of this moment leave [s]."""
@@ -242,6 +243,7 @@ class Judge:
         """Where the scanner reports that it sees nothing the base may creep, and so touch what is there."""
         blind = self._around.scanner is not None and self._around.scanner.hides and self._shown.linear_mps > 0.0
         robot, linear_mps = self._world.robot, self._shown.linear_mps
+        self._sped_up = now_s > self._around.wall_at and (self._sped_up or abs(linear_mps) > self._around.room_mps)
         slowly_s, ahead_s = braking_s(robot, robot.safety.blind_mps, 0.0), moving_s(robot, linear_mps, 0.0)
         self._blind.order(slowly_s if blind else max(slowly_s, ahead_s), now_s)
         allowed_s = self._blind.bound_s(ahead_s, now_s, self._active)
@@ -264,6 +266,7 @@ class Judge:
             "unreachable": self._reach.was_lost,
             "strange hands": self._was_pushed(),
             "lying sensor": self._motion.ran_away,
+            "sped up": self._sped_up,
             "turned away": self._around.turned_rad > TURNED_RAD,
             "second fault": self._faults.overlap_at >= self._around.wall_at - self._one_s,
         }

@@ -9,7 +9,7 @@ import numpy as np
 
 from canbase_campaign.planned import GoalRequest, Plan, Segment
 from canbase_campaign.scanner import Scanner
-from canbase_campaign.wall_place import far_enough_m
+from canbase_campaign.wall_place import SPEEDING_UP_MPS, far_enough_m
 from canbase_campaign.world import World
 from canbase_config.robot import Robot
 from canbase_driver.supervision.fault_reset import RequestOutcome
@@ -94,6 +94,8 @@ class Surroundings:
         self.wall_m: float | None = None
         self.wall_at = -math.inf
         """When it came."""
+        self.room_mps = math.inf
+        """Up to this speed there is room before it, where the scanner shows an old world; infinity: it does not."""
         self._wall_from_m = self._wall_from_rad = 0.0
         self.reset: Callable[[], None] = lambda: None
         """The operator requests a reset; set by the part that plays the operator."""
@@ -110,6 +112,7 @@ class Surroundings:
         base, lies = self._world.drives.bench.base, self.scanner is not None and bool(self.scanner.lies)
         self.wall_at = self._world.clock.now_s
         self.wall_m = far_enough_m(self._world.robot, base.v_mps, self.scan_s, lies=lies) + margin_m
+        self.room_mps = abs(base.v_mps) + SPEEDING_UP_MPS if lies else math.inf
         self._wall_from_m, self._wall_from_rad = base.travel_m, base.turned_rad
 
     def take_wall(self) -> None:
