@@ -78,7 +78,7 @@ def _origin(proxy: str) -> str:
     origin = proxy.lower().removesuffix("/").removesuffix(":443")
     if proxy and not re.fullmatch(r"https://([a-z0-9.-]+|\[[0-9a-f:]+\])(:[0-9]{1,5})?", origin):
         fail(
-            f"--proxy {proxy} is not https://NAME or https://NAME:PORT: a proxy gives the page a name of its own",
+            f"--proxy {proxy}: expected https://NAME or https://NAME:PORT, the address of the page without a path",
             WRONG_INPUT,
         )
     return origin

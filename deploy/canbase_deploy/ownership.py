@@ -25,7 +25,7 @@ NFS4_ACL: Final = "system.nfs4_acl"
 ACLS: Final = ("system.posix_acl_", NFS4_ACL)
 """Extended attributes: lists of a file and default ones of a folder (acl(5)); lists of NFSv4, which ZFS has too."""
 HOMES: Final = ("/home/", "/root/")
-"""Nobody shall give his home to root: the units cannot see it anyway, by ProtectHome."""
+"""Home folders keep their owner: systemd hides them from the services (ProtectHome), so nothing is installed there."""
 TOLD: Final = 3
 """So many faults are named; the cure of one is often that of all."""
 

@@ -27,7 +27,7 @@ def test_an_address_that_no_browser_can_open_is_refused(host: str) -> None:
 @pytest.mark.parametrize("url", ["http://robot.example", "robot.example", "https://", "https://robot.example/canbase"])
 def test_a_proxy_without_tls_or_with_a_path_is_refused(url: str) -> None:
     code, said = refused("--proxy", url)
-    assert (code, "is not https://NAME" in said) == (2, True)
+    assert (code, "expected https://NAME" in said) == (2, True)
 
 
 @pytest.mark.parametrize("url", ["https://Robot.example", "https://robot.example:443/"])
