@@ -17,7 +17,7 @@ from canbase_action_server.outcome import ErrorCode
 from canbase_action_server.state_topics import DRIVER, MUX, ODOMETRY, SAFETY, States, StateTopic
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.stop_cause import SCAN_LOST, StopCause
+from canbase_runtime.stop_cause import SCAN_LOST, StopCause, because
 from canbase_runtime.watchdog_view import WatchdogView
 
 CLIENT_SILENT = "no keepalive from the client (action.require_client_lease): it ended, hangs, or sends none"
@@ -74,14 +74,14 @@ def _watchdog(s: Situation) -> str | None:
     driver = s.states.driver
     if driver is None or driver.watchdog is WatchdogView.OK:
         return None
-    return f"watchdog {driver.watchdog.value}, cause {driver.watchdog_cause}; find the cause, then reset"
+    return f"watchdog {driver.watchdog.value}{because(driver.watchdog_cause)}; find the cause, then reset"
 
 
 def _drive_fault(s: Situation) -> str | None:
     driver = s.states.driver
     if driver is None or driver.state is DriverState.ENABLED:
         return None
-    return f"motor_driver is {driver.state.word}, cause {driver.cause}: {driver.detail}"
+    return f"motor_driver is {driver.state.word}{because(driver.cause)}: {driver.detail}"
 
 
 def _odometry_lost(s: Situation) -> str | None:

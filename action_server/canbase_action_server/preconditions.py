@@ -8,7 +8,7 @@ from canbase_action_server.inputs import Inputs
 from canbase_action_server.state_topics import STATE_TOPICS, States
 from canbase_config.robot import Robot
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.stop_cause import SCAN_LOST, StopCause
+from canbase_runtime.stop_cause import SCAN_LOST, StopCause, because
 from canbase_runtime.watchdog_view import WatchdogView
 
 NO_SOURCE = (
@@ -51,7 +51,7 @@ def _condition(robot: Robot, states: States) -> str | None:
     if safety and (safety.estop or safety.cause.is_estop):
         return f"emergency stop holds: {safety.detail}; release it and reset"
     if driver and driver.watchdog is not WatchdogView.OK:
-        return f"watchdog is {driver.watchdog.value} (cause {driver.watchdog_cause}); start or reset it"
+        return f"watchdog is {driver.watchdog.value}{because(driver.watchdog_cause)}; start or reset it"
     if driver and driver.state is not DriverState.ENABLED:
         return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}"
     if driver and not driver.hears_command:

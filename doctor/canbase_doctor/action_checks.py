@@ -14,7 +14,7 @@ from canbase_action_server.goal_step import GoalStep
 from canbase_action_server.nav2_request import Target, back_up, drive_on_heading, spin
 from canbase_action_server.preconditions import state_reason
 from canbase_config.robot import Robot
-from canbase_doctor.check import Check, fail, ok, too_slow, warn
+from canbase_doctor.check import RESTART, Check, fail, ok, too_slow, warn
 from canbase_doctor.evidence import Evidence, Goal, LoggedStep, served_actions
 
 ACTION = "drive_distance"
@@ -195,7 +195,7 @@ def server_answers(seen: Evidence) -> Check:
     return fail(
         name,
         "to nothing: it ended, or hangs",
-        "the result is lost; look at the base, and do not send the goal again blindly",
+        f"{RESTART}. The result is lost: look at the base, and do not send the goal again blindly",
     )
 
 

@@ -12,7 +12,7 @@ from canbase_commissioning.can_interface import Link
 from canbase_config.bus_load import BUSY_LOAD, FULL_LOAD
 from canbase_config.drive import Drive
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
-from canbase_doctor.check import Check, fail, ok, warn
+from canbase_doctor.check import RESTART, Check, fail, ok, warn
 from canbase_doctor.inspection import Inspection, Part
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.nmt import NmtState
@@ -23,6 +23,7 @@ from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, RUNGS, T
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
 """Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one without acknowledgement
 goes out late."""
+RUNS: Final = f"If it runs, it hangs: {RESTART}"
 _SHOWN: Final = 4
 _CUT_OFF: Final = (ControllerState.BUS_OFF, ControllerState.ERROR_PASSIVE, ControllerState.STOPPED)
 """Little or nothing gets through."""
@@ -131,7 +132,13 @@ def _watchdog(seen: BusEvidence) -> list[Check]:
     if state is None:
         if not seen.canbase_runs:
             return []
-        return [fail("watchdog's state (1FEh)", "never received", "start canbase serve watchdog with this robot.yaml")]
+        return [
+            fail(
+                "watchdog's state (1FEh)",
+                "never received",
+                f"start canbase serve watchdog with this robot.yaml. {RUNS}",
+            )
+        ]
     age_s = seen.now_s - seen.heard.watchdog_at
     lease = "none yet" if state.lease_age_ms == LEASE_AGE_UNKNOWN else f"{state.lease_age_ms} ms old"
     found = f"{('starting', 'watching', 'tripped')[state.state]}, received {age_s * 1000:.0f} ms ago; lease {lease}"
@@ -139,16 +146,14 @@ def _watchdog(seen: BusEvidence) -> list[Check]:
     if WATCHDOG_NODE_ID not in seen.heard.nodes:
         rows.append(fail("watchdog's heartbeat (77Eh)", "not received", "it withholds it after a trip: canbase reset"))
     if DRIVER_NODE_ID not in seen.heard.nodes:
-        rows.append(
-            fail("driver's heartbeat (77Fh)", "not received", "motor_driver does not run, or hangs: see its log")
-        )
+        rows.append(fail("driver's heartbeat (77Fh)", "not received", f"start motor_driver. {RUNS}"))
     return [*rows, *([_counters(seen.heard.counters)] if seen.heard.counters else [])]
 
 
 def _watchdog_state(seen: BusEvidence, found: str, age_s: float) -> Check:
     name, state = "watchdog's state (1FEh)", seen.heard.watchdog
     if state is None or age_s > seen.robot.timeouts.watchdog_s:
-        return fail(name, found, "it has ended or hangs: see its log; the drives stop by themselves")
+        return fail(name, found, f"it has ended or hangs: {RESTART}; the drives stop by themselves")
     if state.state == TRIPPED:
         about = f" of node {state.node_id}" if state.node_id else ""
         rung = RUNGS[state.rung] if state.rung < len(RUNGS) else str(state.rung)

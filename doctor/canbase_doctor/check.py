@@ -33,6 +33,8 @@ STYLE = {Verdict.OK: "green", Verdict.WARN: "yellow", Verdict.INCONCLUSIVE: "mag
 
 INCONCLUSIVE = 3
 """Exit code."""
+RESTART = "restart its service, or end `canbase up` and start it again"
+"""What to do about a process that hangs."""
 
 
 @dataclass(frozen=True, slots=True)

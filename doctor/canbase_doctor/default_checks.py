@@ -11,7 +11,7 @@ from typing import Any
 
 from canbase.msg import DriverStatus, SafetyState
 
-from canbase_doctor.check import Check, fail, ok, warn
+from canbase_doctor.check import RESTART, Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
 from canbase_doctor.metrics_check import metrics
 from canbase_doctor.nav2_checks import nav2_checks
@@ -28,7 +28,7 @@ UNFOLLOWED = {
 """What to do about a source that holds the base and is not followed."""
 SILENT_S = 1.5
 """A state that was received longer ago is no evidence [s]: the slowest one comes every 0.5 s."""
-HANGS = "its process hangs, or its timers do not run: read its log, and restart it"
+HANGS = f"its process hangs, or its timers do not run: {RESTART}"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
 MOSTLY_USABLE = 0.5
 """Share of beams: a scanner with more invalid beams is covered, dirty or defective."""

@@ -18,7 +18,7 @@ from canbase_fleet.robot_view import DRIVER, MUX, SAFETY, RobotView
 from canbase_fleet.safety_state import has_field
 from canbase_runtime.driver_state import DriverState, driver_state
 from canbase_runtime.foreign_text import NAME_LENGTH, SENTENCE_LENGTH, printable
-from canbase_runtime.stop_cause import SCAN_LOST, StopCause, stop_cause
+from canbase_runtime.stop_cause import SCAN_LOST, StopCause, because, stop_cause
 from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
 MOST: Final = 50
@@ -96,7 +96,7 @@ def _driver(message: Any) -> Iterator[Error]:
         yield Error("driver_not_enabled", WARNING if passes else FATAL, text, message.clears_on, cause)
     view = watchdog_view(message.watchdog)
     if view is not WatchdogView.OK:
-        text = f"the watchdog is {view.value}; cause: {message.watchdog_cause}"
+        text = f"the watchdog is {view.value}{because(message.watchdog_cause)}"
         yield Error("watchdog", FATAL, text, "remove the cause, then reset" if view is WatchdogView.TRIPPED else "")
     if message.bus_problem:
         yield Error("can_bus", FATAL, message.bus_problem)

@@ -44,3 +44,8 @@ def stop_cause(word: str) -> StopCause:
 
 
 _WORDS = {cause.value: cause for cause in StopCause}
+
+
+def because(cause: str) -> str:
+    """The cause in a message of driver or watchdog, for a sentence; empty where there is none."""
+    return "" if cause in ("", StopCause.NONE.value) else f" (cause {cause})"

@@ -38,7 +38,7 @@ from canbase_velocity.changes import DropTeller, changed_order, is_told
 from canbase_velocity.decision import Decision
 from canbase_velocity.estop import EstopState
 from canbase_velocity.filter_diagnostics import diagnostics
-from canbase_velocity.filter_state import SafetyFilter
+from canbase_velocity.filter_state import NOT_LATCHED, SafetyFilter
 from canbase_velocity.graph import BUTTON_KIND, SCAN_KIND, publishers
 from canbase_velocity.input_ring import Note, filter_entry, forget
 from canbase_velocity.lease import lease_datagram
@@ -242,7 +242,8 @@ class FilterNode(Node):
             moving = list(self._moving_sources())
             self._note("reset", now_s, moving)
             response.success, response.message = self._filter.reset(moving, now_s)
-        self._event_log.write(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
+        if response.message != NOT_LATCHED:  # `canbase reset` calls it in any case
+            self._event_log.write(f"reset: {response.message}", Priority.NOTICE, robot=self._robot.name)
         return response
 
     def _tick(self) -> None:
@@ -293,14 +294,9 @@ class FilterNode(Node):
 
     def _send_lease(self, decision: Decision) -> None:
         self._lease_sequence += 1
-        report = self._leases.send(
-            lease_datagram(
-                self._lease_sequence,
-                time.monotonic_ns(),
-                decision.twist,
-                brakes_hard=decision.emergency,
-            )
-        )
+        now_ns = time.monotonic_ns()
+        lease = lease_datagram(self._lease_sequence, now_ns, decision.twist, brakes_hard=decision.emergency)
+        report = self._leases.send(lease, now_ns * 1e-9)
         if report is not None:
             self._event_log.write(report, Priority.WARNING, robot=self._robot.name)
 

@@ -47,6 +47,7 @@ NO_SCAN = (
 )
 LONGEST_SINCE_S = 0.1
 """Orders after a longer gap may grow as far as after this one [s]."""
+NOT_LATCHED = "The emergency stop is not latched: nothing to reset"
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +262,7 @@ class SafetyFilter:
                 held = f"not seen released yet ({self._estop.before_the_start}): press and release it"
             return False, f"refused: the emergency stop on {self._config.safety.estop.topic} is {held}"
         if self._estop.state is EstopState.FREE and not moving:
-            return True, "The emergency stop is not latched: nothing to reset"
+            return True, NOT_LATCHED
         if self.estop_crowd and self._estop.state is not EstopState.FREE:
             return False, f"refused: {self.estop_crowd}"
         if moving or not inputs.command.is_zero:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from canbase_commissioning.bus_monitor import OURS, Listener
 from canbase_commissioning.drive_survey import FoundAxis, profile_of, survey
-from canbase_commissioning.guide import CommissionError, Tell
+from canbase_commissioning.guide import Ask, CommissionError, Tell
 from canbase_commissioning.identification import Identification
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
-from canbase_commissioning.onbus.operator import Operator, Person
+from canbase_commissioning.onbus.operator import BACK, Operator, Person
 from canbase_commissioning.onbus.remote_operator import RemoteOperator
-from canbase_commissioning.robot_draft import Draft, ask_about, robot_yaml
+from canbase_commissioning.robot_draft import Draft, Questions, ask_about, robot_yaml
 from canbase_commissioning.scan_rows import twins_advice
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.errors import ConfigError
@@ -47,7 +47,7 @@ def run(bus: Bus, output: Path, answers: Path | None, timeout_s: float, *, yes: 
             FAILED,
         )
     try:
-        draft = _answered(axes, person)
+        draft = answered_draft(axes, person)
     except CommissionError as error:
         fail(str(error), FAILED)
     _write(output, robot_yaml(_sample_for(bus), draft, bus), person)
@@ -89,9 +89,20 @@ def _surveyed(
     return axes
 
 
-def _answered(axes: Sequence[FoundAxis], person: Person) -> Draft:
-    """The answers of the person. Raises CommissionError."""
-    questions = ask_about(axes)
+def answered_draft(axes: Sequence[FoundAxis], person: Person) -> Draft:
+    """The answers of the person; BACK returns to the question before. Raises CommissionError."""
+    person.tell(Tell(f"Enter takes the value in [brackets]; {BACK} returns to the question before"))
+    given: list[object] = []
+    while True:
+        draft = _asked(ask_about(axes), given, person)
+        if draft is not None:
+            return draft
+        given.pop()
+
+
+def _asked(questions: Questions, given: list[object], person: Person) -> Draft | None:
+    """Asks what is not `given` yet, and notes the answers there. None: the person wants to go back."""
+    known = list(given)
     answer: object = None
     while True:
         try:
@@ -102,13 +113,29 @@ def _answered(axes: Sequence[FoundAxis], person: Person) -> Draft:
             return draft
         answer = None
         if isinstance(step, Tell):
-            person.tell(step)
-            continue
-        while answer is None:
-            try:
-                answer = step.check(person.ask(step, lambda: time.sleep(THINKING_S)))
-            except ValueError as error:
-                person.again(step, error)
+            if not known:
+                person.tell(step)
+        elif known:
+            answer = known.pop(0)
+        else:
+            answer = _answer(step, person, is_first=not given)
+            if answer == BACK:
+                return None
+            given.append(answer)
+
+
+def _answer(question: Ask, person: Person, *, is_first: bool) -> object:
+    """What the answer means, or BACK."""
+    while True:
+        text = person.ask(question, lambda: time.sleep(THINKING_S))
+        try:
+            if text != BACK:
+                return question.check(text)
+            if not is_first:
+                return BACK
+            raise ValueError("this is the first question")
+        except ValueError as error:
+            person.again(question, error)
 
 
 def _sample_for(bus: Bus) -> str:

@@ -18,6 +18,8 @@ from canbase_config.errors import ConfigError
 from canbase_config.yaml_file import read_yaml
 from canbase_runtime.terminal import WRONG_INPUT, colour, fail
 
+BACK: Final = "back"
+"""The answer of a person who wants to give the one before again (`canbase setup init`)."""
 ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -111,6 +113,8 @@ class Operator:
     def ask(self, question: Ask, turn: Callable[[], None]) -> str:
         """The words of the answer; `turn` keeps the bus going meanwhile. Raises CommissionError without a person."""
         known = self._known(question)
+        if known == BACK:
+            raise CommissionError(f"{question.key} in --answers: {BACK} is for a person on a terminal")
         if known is not None:
             typer.echo(f"{_asked(question)} {known}")
             return known

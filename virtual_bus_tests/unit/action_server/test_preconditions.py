@@ -97,6 +97,11 @@ def test_every_state_of_the_watchdog_but_ok_is_named_with_its_cause(view: Watchd
     assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == expected
 
 
+def test_a_watchdog_that_is_missing_has_no_cause() -> None:
+    driver = replace(GOOD_DRIVER, watchdog=WatchdogView.MISSING, watchdog_cause="none")
+    assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == "watchdog is missing; start or reset it"
+
+
 def test_of_several_causes_the_one_that_explains_the_others_is_named() -> None:
     everything = replaced(
         READY,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
 
 from canbase_commissioning.drive_survey import FoundAxis
 from canbase_commissioning.guide import Ask, CommissionError, Tell
+from canbase_commissioning.onbus.init_command import answered_draft
 from canbase_commissioning.robot_draft import Draft, ask_about, robot_yaml
 from canbase_config.load import Loaded, load_robot, sample
 from canbase_config.profile_file import profile_names
@@ -165,3 +166,32 @@ def test_a_robot_of_any_size_passes_the_check_and_turns_no_faster_than_its_wheel
     limits = loaded(tmp_path, draft).robot.limits
     assert limits.linear_mps == float(speed)
     assert 0.0 < limits.angular_radps <= min(2.0 * float(speed) / float(track) * 1.05, 0.81 * math.pi)
+
+
+class Typist:
+    """Types these words, then takes what is proposed."""
+
+    def __init__(self, *typed: str) -> None:
+        self.typed, self.asked, self.errors = list(typed), list[str](), list[str]()
+
+    def tell(self, line: Tell) -> None:
+        """Nothing is done with it."""
+
+    def ask(self, question: Ask, _turn: Callable[[], None]) -> str:
+        self.asked.append(question.key)
+        return self.typed.pop(0) if self.typed else words(question, FRESH)
+
+    def again(self, _question: Ask, error: ValueError) -> None:
+        self.errors.append(str(error))
+
+    def interrupts(self) -> bool:
+        return False
+
+
+def test_back_returns_to_the_question_before_and_the_later_answer_counts() -> None:
+    person = Typist("back", "fred", "right", "back", "back", "anna", "left")
+    draft = answered_draft(two(), person)
+    asked = ["name", "name", "node1.side", "node1.gear_ratio", "node1.side", "name", "node1.side", "node1.gear_ratio"]
+    assert person.asked[: len(asked)] == asked
+    assert person.errors == ["this is the first question"]
+    assert (draft.name, [wheel.side.value for wheel in draft.wheels]) == ("anna", ["left", "right"])

@@ -123,6 +123,8 @@ def test_a_watchdog_or_driver_that_is_silent_fails() -> None:
     assert not_ok(evidence(heard=heard(*DRIVER, *DRIVES))) == [("watchdog's state (1FEh)", Verdict.FAIL)]
     assert not_ok(evidence(heard=heard(*WATCHDOG, *DRIVES))) == [("driver's heartbeat (77Fh)", Verdict.FAIL)]
     assert ("watchdog's state (1FEh)", Verdict.FAIL) in not_ok(evidence(now_s=11.2))
+    for seen in (evidence(heard=heard(*DRIVER, *DRIVES)), evidence(now_s=11.2)):  # "it hangs" alone helps nobody
+        assert "restart its service, or end `canbase up`" in row(seen, "watchdog's state (1FEh)")
 
 
 def test_the_watchdogs_counters_are_shown_and_refused_leases_are_a_warning() -> None:

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from canbase_velocity.lease import lease_datagram
-from canbase_velocity.lease_sender import LeaseSender
+from canbase_velocity.lease_sender import STARTS_S, LeaseSender
 from canbase_velocity.twist import ZERO, Twist
 
 LEASE = lease_datagram(1, 2, Twist(0.5, -1.0), brakes_hard=False)
@@ -66,31 +66,42 @@ def test_the_sequence_starts_at_1() -> None:
 
 
 def test_a_lease_arrives(sender: LeaseSender, watchdog: socket.socket) -> None:
-    assert sender.send(LEASE) is None
+    assert sender.send(LEASE, 0.0) is None
     assert watchdog.recv(100) == LEASE
     assert sender.errors == 0
 
 
 def test_a_missing_watchdog_is_counted_and_told_once_and_so_is_its_return(path: str, sender: LeaseSender) -> None:
-    told = sender.send(LEASE)
+    assert sender.send(LEASE, 0.0) is None  # it may be starting
+    told = sender.send(LEASE, STARTS_S)
     assert told is not None
     assert path in told
     assert "No such file" in told
-    assert sender.send(LEASE) is None
-    assert sender.errors == 2
+    assert sender.send(LEASE, STARTS_S) is None
+    assert sender.errors == 3
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
         receiver.bind(path)
-        assert sender.send(LEASE) == f"leases reach the watchdog at {path} again"
+        assert sender.send(LEASE, STARTS_S) == f"leases reach the watchdog at {path} again"
         assert receiver.recv(100) == LEASE
-    told = sender.send(LEASE)  # it died; its socket file is left
+    told = sender.send(LEASE, STARTS_S)  # it died; its socket file is left
     assert told is not None
     assert "Connection refused" in told
-    assert sender.errors == 3
+    assert sender.errors == 4
+
+
+def test_a_watchdog_that_starts_after_the_filter_is_no_news(path: str, sender: LeaseSender) -> None:
+    assert sender.send(LEASE, 100.0) is None
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(path)
+        assert sender.send(LEASE, 100.1) is None
+    told = sender.send(LEASE, 100.2)  # once there, it is missed at once
+    assert told is not None
+    assert "Connection refused" in told
 
 
 @pytest.mark.usefixtures("watchdog")
 def test_a_watchdog_that_hangs_blocks_nobody(sender: LeaseSender) -> None:
-    told = [sender.send(LEASE) for _ in range(2000)]
+    told = [sender.send(LEASE, STARTS_S) for _ in range(2000)]
     assert sender.errors > 0
     assert [text for text in told if text is not None] == [text for text in told if "unavailable" in str(text)]
     assert sum(text is not None for text in told) == 1
