@@ -23,6 +23,8 @@ CONTROLLER: Final = "FollowPath"
 MPPI: Final = "nav2_mppi_controller::MPPIController"
 """The controller of Nav2's own parameter file; the names of its limits are known here, those of others are not."""
 ODOM: Final = "odom"
+FILTERED: Final = "odometry/filtered"
+"""Topic of robot_localization, which publishes the transform in place of motor_driver."""
 PLUGINS: Final = ("spin", "backup", "drive_on_heading", "assisted_teleop", "wait")
 """behavior_plugins of Nav2's own parameter file."""
 CELL_M: Final = 0.05
@@ -41,6 +43,18 @@ class Bounded:
         """What is `given` in Nav2's file, or the usual value, within the limits."""
         number = given if isinstance(given, (int, float)) and not isinstance(given, bool) else self.usual
         return _tidy(min(max(float(number), self.low), self.high))
+
+
+@dataclass(frozen=True, slots=True)
+class BoundedList:
+    """A list of numbers that Nav2 chooses, each within limits."""
+
+    numbers: tuple[Bounded, ...]
+
+    def of(self, given: object) -> list[float]:
+        """What is `given` in Nav2's file, or the usual list, within the limits."""
+        chosen = given if isinstance(given, list) and len(given) == len(self.numbers) else [None] * len(self.numbers)
+        return [bounded.of(number) for bounded, number in zip(self.numbers, chosen, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,19 +89,23 @@ def speeds(robot: Robot) -> Speeds:
 
 
 def parameters(robot: Robot, namespace: str = "") -> dict[Path, Any]:
-    """Path in a parameter file of Nav2 → value; a `Bounded` or `Without` where Nav2's own value stays, within limits.
+    """Path in a parameter file of Nav2 → value; where Nav2's own value stays, within limits, what those are.
+
+    A tuned speed is lowered, never raised.
 
     Raises ValueError as `chain` does.
     """
-    wiring = chain(robot, namespace)
+    wiring, odom = chain(robot, namespace), _odom(robot)
     sections: dict[Path, dict[str, Any]] = {
         ("amcl",): _amcl(robot),
-        ("bt_navigator",): {"robot_base_frame": robot.base.base_frame, "odom_topic": ODOM},
-        ("controller_server",): {"odom_topic": ODOM, CONTROLLER: _mppi(robot)},
+        ("bt_navigator",): {"robot_base_frame": robot.base.base_frame, "odom_topic": odom},
+        ("controller_server",): {"odom_topic": odom, CONTROLLER: _mppi(robot)},
         ("local_costmap", "local_costmap"): _costmap(robot, namespace, "voxel_layer")
         | {"global_frame": robot.base.odom_frame},
         ("global_costmap", "global_costmap"): _costmap(robot, namespace, "obstacle_layer"),
         ("behavior_server",): _behaviors(robot),
+        ("smoother_server",): {"robot_base_frame": robot.base.base_frame},
+        ("route_server",): {"base_frame": robot.base.base_frame},
         ("velocity_smoother",): _smoother(robot, wiring),
         ("collision_monitor",): _monitor(robot, wiring),
         ("docking_server",): _docking(robot),
@@ -111,15 +129,27 @@ def _amcl(robot: Robot) -> dict[str, Any]:
     return frames | {"scan_topic": robot.safety.scan.topic}
 
 
+def _odom(robot: Robot) -> str:
+    return ODOM if robot.odometry.publish_tf else FILTERED
+
+
+def _at_most(value: float) -> Bounded:
+    return Bounded(value, high=value)
+
+
+def _at_least(value: float) -> Bounded:
+    return Bounded(value, low=value)
+
+
 def _mppi(robot: Robot) -> dict[str, Any]:
     most, limits = speeds(robot), robot.limits
     return {
-        "vx_max": _tidy(most.linear_mps),
+        "vx_max": _at_most(most.linear_mps),
         "vx_min": Bounded(-0.35, low=-most.linear_mps),
-        "wz_max": _tidy(most.angular_radps),
-        "ax_max": _tidy(limits.acceleration_mps2),
-        "ax_min": -_tidy(limits.deceleration_mps2),
-        "az_max": _tidy(limits.angular_acceleration_radps2),
+        "wz_max": _at_most(most.angular_radps),
+        "ax_max": _at_most(limits.acceleration_mps2),
+        "ax_min": _at_least(-limits.deceleration_mps2),
+        "az_max": _at_most(limits.angular_acceleration_radps2),
     }
 
 
@@ -158,14 +188,18 @@ def _behaviors(robot: Robot) -> dict[str, Any]:
 
 
 def _smoother(robot: Robot, wiring: Chain) -> dict[str, Any]:
-    most, limits = speeds(robot), robot.limits
-    fastest = [_tidy(most.linear_mps), 0.0, _tidy(most.angular_radps)]
+    most, limits, sideways = speeds(robot), robot.limits, Bounded(0.0, low=0.0, high=0.0)
+    linear_mps, angular_radps = most.linear_mps, most.angular_radps
     return {
-        "odom_topic": ODOM,
-        "max_velocity": fastest,
-        "min_velocity": [_tidy(-value) for value in fastest],
-        "max_accel": [_tidy(limits.acceleration_mps2), 0.0, _tidy(limits.angular_acceleration_radps2)],
-        "max_decel": [-_tidy(limits.deceleration_mps2), 0.0, -_tidy(limits.angular_deceleration_radps2)],
+        "odom_topic": _odom(robot),
+        "max_velocity": BoundedList((_at_most(linear_mps), sideways, _at_most(angular_radps))),
+        "min_velocity": BoundedList((_at_least(-linear_mps), sideways, _at_least(-angular_radps))),
+        "max_accel": BoundedList(
+            (_at_most(limits.acceleration_mps2), sideways, _at_most(limits.angular_acceleration_radps2))
+        ),
+        "max_decel": BoundedList(
+            (_at_least(-limits.deceleration_mps2), sideways, _at_least(-limits.angular_deceleration_radps2))
+        ),
         "velocity_timeout": Bounded(1.0, high=wiring.timeout_s),
     }
 

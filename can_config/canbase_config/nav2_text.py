@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any, Final
 
@@ -11,10 +11,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from canbase_config.nav2_chain import NODES, Chain
-from canbase_config.nav2_params import CONTROLLER, MPPI, ROS, Bounded, Path, Speeds, Without
+from canbase_config.nav2_params import CONTROLLER, MPPI, ROS, Bounded, BoundedList, Path, Speeds, Without
 from canbase_config.yaml_file import read_yaml
 
-_PLUGIN: Final = ("controller_server", ROS, CONTROLLER, "plugin")
+_SERVER: Final = ("controller_server", ROS)
 _HEADER: Final = """\
 # Parameters of Nav2 for the robot {robot}, printed by canbase print nav2 from its robot.yaml.
 # {how}
@@ -47,14 +47,13 @@ REMAPPINGS = (
 def generate_launch_description():
     """Each remapping holds for one node, and before those of Nav2's launch file. Other arguments are passed on."""
     arguments = {{name: LaunchConfiguration(name) for name in ("params_file", "namespace", "use_namespace")}}
-    path = PathJoinSubstitution([FindPackageShare("nav2_bringup"), "launch", LaunchConfiguration("file")])
+    path = PathJoinSubstitution([FindPackageShare("nav2_bringup"), "launch", "bringup_launch.py"])
     nav2 = IncludeLaunchDescription(PythonLaunchDescriptionSource(path), launch_arguments=arguments.items())
     return LaunchDescription(
         [
             DeclareLaunchArgument("params_file", description="what canbase print nav2 --params has printed"),
             DeclareLaunchArgument("namespace", default_value="{namespace}"),
             DeclareLaunchArgument("use_namespace", default_value="{uses}"),
-            DeclareLaunchArgument("file", default_value="bringup_launch.py", description="or navigation_launch.py"),
             GroupAction([*(SetRemap(src=src, dst=dst) for src, dst in REMAPPINGS), nav2]),
         ]
     )
@@ -66,11 +65,11 @@ def parameter_file(robot: str, values: Mapping[Path, Any], wiring: Chain) -> str
     return _printed(robot, _ALONE, _laid(CommentedMap(), values), wiring)
 
 
-def merged_file(robot: str, values: Mapping[Path, Any], wiring: Chain, path: FilePath) -> tuple[str, bool]:
+def merged_file(robot: str, values: Mapping[Path, Any], wiring: Chain, path: FilePath) -> tuple[str, tuple[str, ...]]:
     """The parameter file of Nav2 at `path` with `values` laid into it; what else is there stays, comments too.
 
-    And whether its controller is one whose limits are known; otherwise that controller keeps its own. Raises
-    ConfigError for a file that is no YAML, ValueError for one without Nav2's nodes.
+    And the controllers whose limits are not known: they keep their own. Raises ConfigError for a file that is no YAML,
+    ValueError for one without Nav2's nodes.
     """
     read_yaml(path)  # refuses what is too large or broken, with its line
     base = _yaml().load(path.read_text(encoding="utf-8"))
@@ -79,16 +78,33 @@ def merged_file(robot: str, values: Mapping[Path, Any], wiring: Chain, path: Fil
         raise ValueError(
             f"{path} has none of {names} as a key: expected a file like params/nav2_params.yaml of nav2_bringup"
         )
-    known = _get(base, _PLUGIN) in (None, MPPI)
-    kept = values if known else {key: value for key, value in values.items() if CONTROLLER not in key}
-    return _printed(robot, _LAID.format(file=path.name), _laid(base, kept), wiring), known
+    known = {name: _is_mppi(base, name) for name in _controllers(base)}
+    kept = {
+        tuple(name if key == CONTROLLER else key for key in key_path): value
+        for key_path, value in values.items()
+        for name in ([name for name, is_known in known.items() if is_known] if CONTROLLER in key_path else [CONTROLLER])
+    }
+    others = tuple(name for name, is_known in known.items() if not is_known)
+    return _printed(robot, _LAID.format(file=path.name), _laid(base, kept), wiring), others
 
 
-def other_controller(most: Speeds) -> str:
-    """The note of a file whose controller keeps its own limits."""
+def _controllers(base: Any) -> list[str]:
+    """The names in controller_plugins of Nav2's file, or Nav2's own."""
+    names = _get(base, (*_SERVER, "controller_plugins"))
+    return [str(name) for name in names] if isinstance(names, list) else [CONTROLLER]
+
+
+def _is_mppi(base: Any, name: str) -> bool:
+    """A rotation shim has the parameters of its primary_controller beside its own."""
+    inner, plugin = (_get(base, (*_SERVER, name, key)) for key in ("primary_controller", "plugin"))
+    return (inner or plugin) in (None, MPPI)
+
+
+def other_controllers(names: Sequence[str], most: Speeds) -> str:
+    """The note of a file whose controllers `names` keep their own limits."""
     return (
-        f"{CONTROLLER} is not {MPPI}: its speeds are left as they are; set them to at most {most.linear_mps:g} m/s and "
-        f"{most.angular_radps:g} rad/s. velocity_smoother limits them in any case"
+        f"not {MPPI}: {', '.join(names)}. The speeds of these controllers are left as they are; set them to at most "
+        f"{most.linear_mps:g} m/s and {most.angular_radps:g} rad/s. velocity_smoother limits them in any case"
     )
 
 
@@ -109,7 +125,7 @@ def _printed(robot: str, how: str, tree: Any, wiring: Chain) -> str:
 def _laid(tree: Any, values: Mapping[Path, Any]) -> Any:
     for path, value in values.items():
         given = _get(tree, path)
-        _set(tree, path, value.of(given) if isinstance(value, (Bounded, Without)) else value)
+        _set(tree, path, value.of(given) if isinstance(value, (Bounded, BoundedList, Without)) else value)
     return tree
 
 

@@ -38,7 +38,7 @@ def nav2(
     from canbase_config.errors import ConfigError
     from canbase_config.nav2_chain import chain
     from canbase_config.nav2_params import parameters, speeds
-    from canbase_config.nav2_text import launch_file, merged_file, other_controller, parameter_file
+    from canbase_config.nav2_text import launch_file, merged_file, other_controllers, parameter_file
 
     if launch and params is not None:
         raise typer.BadParameter(
@@ -47,16 +47,17 @@ def nav2(
     robot = load_config(one_of(file, config), quiet=True).robot
     try:
         wiring, values = chain(robot, namespace), parameters(robot, namespace)
-        notes, known = list(wiring.notes), True
+        notes: list[str] = list(wiring.notes)
+        others: tuple[str, ...] = ()
         if launch:
             text = launch_file(robot.name, wiring, namespace)
         elif params is None:
             text = parameter_file(robot.name, values, wiring)
         else:
-            text, known = merged_file(robot.name, values, wiring, params)
+            text, others = merged_file(robot.name, values, wiring, params)
     except (ValueError, ConfigError) as error:
         fail(str(error), WRONG_INPUT)
-    notes += [] if known else [other_controller(speeds(robot))]
+    notes += [other_controllers(others, speeds(robot))] if others else []
     for note in notes:
         typer.echo(f"note: {note}", err=True)
     typer.echo(text, nl=False)

@@ -31,7 +31,7 @@ velocity_smoother:
     velocity_timeout: 0.3
 controller_server:
   ros__parameters:
-    FollowPath: {plugin: PLUGIN, vx_max: 3.0, model_dt: 0.05}
+    FollowPath: {plugin: PLUGIN, vx_max: 3.0, ax_max: 0.4, model_dt: 0.05}
     FollowPath.wz_max: 9.0
     FollowPath.vx_min: -0.1
 behavior_server:
@@ -178,7 +178,8 @@ def test_parameters_alone_are_those_of_the_bench() -> None:
     local = values["local_costmap"]["local_costmap"][ROS]
     assert yaml.safe_load(local["footprint"]) == [[0.3, 0.3], [0.3, -0.3], [-0.3, -0.3], [-0.3, 0.3]]
     assert local["voxel_layer"]["scan"]["topic"] == "/robot1/scan"
-    assert values["amcl"][ROS]["base_frame_id"] == "base_link"
+    assert values["amcl"][ROS]["base_frame_id"] == values["route_server"][ROS]["base_frame"] == "base_link"
+    assert values["smoother_server"][ROS]["robot_base_frame"] == "base_link"
     assert all(type(number) is float for number in smoother["max_velocity"] + smoother["max_accel"])
     assert "docking: {topic: cmd_vel_docking" in result.stderr
 
@@ -204,10 +205,10 @@ def test_every_scanner_is_a_source_of_both_costmaps_and_of_the_monitor() -> None
 def test_laid_into_a_file_of_nav2_what_else_is_there_stays(tmp_path: Path) -> None:
     values = laid(tmp_path, NAV2.replace("PLUGIN", MPPI))
     assert values["velocity_smoother"][ROS]["smoothing_frequency"] == 20.0
-    assert values["velocity_smoother"][ROS]["max_velocity"] == [0.8, 0.0, 2.0]
+    assert values["velocity_smoother"][ROS]["max_velocity"] == [0.5, 0.0, 2.0], "lowered, never raised"
     assert values["velocity_smoother"][ROS]["velocity_timeout"] == 0.3, "shorter than the source's timeout"
     follow = values["controller_server"][ROS]
-    assert (follow["FollowPath"]["vx_max"], follow["FollowPath"]["model_dt"]) == (0.8, 0.05)
+    assert follow["FollowPath"] | {"vx_max": 0.8, "ax_max": 0.4, "model_dt": 0.05} == follow["FollowPath"]
     assert follow["FollowPath.wz_max"] == 2.0, "with dots or nested, ROS takes both"
     assert follow["FollowPath.vx_min"] == -0.1
     assert {"wz_max", "vx_min"}.isdisjoint(follow["FollowPath"])
@@ -221,10 +222,31 @@ def test_laid_into_a_file_of_nav2_what_else_is_there_stays(tmp_path: Path) -> No
 
 def test_another_controller_keeps_its_own_speeds_and_is_noted(tmp_path: Path) -> None:
     values = laid(tmp_path, NAV2.replace("PLUGIN", RPP))
-    assert values["controller_server"][ROS]["FollowPath"] == {"plugin": RPP, "vx_max": 3.0, "model_dt": 0.05}
+    assert values["controller_server"][ROS]["FollowPath"] == {
+        "plugin": RPP, "vx_max": 3.0, "ax_max": 0.4, "model_dt": 0.05
+    }  # fmt: skip
     assert values["controller_server"][ROS]["enable_stamped_cmd_vel"] is True
     result = canbase("--params", str(tmp_path / "nav2_params.yaml"))
     assert "set them to at most 0.8 m/s and 2 rad/s" in result.stderr
+
+
+def test_controllers_have_the_names_of_controller_plugins(tmp_path: Path) -> None:
+    plugins = {"Fast": {"plugin": MPPI, "vx_max": 0.26}, "Dock": {"plugin": RPP},
+               "Shim": {"plugin": "nav2_rotation_shim_controller::RotationShimController", "primary_controller": MPPI,
+                        "vx_max": 2.0}}  # fmt: skip
+    text = yaml.safe_dump({"controller_server": {ROS: {"controller_plugins": list(plugins), **plugins}}})
+    server = laid(tmp_path, text)["controller_server"][ROS]
+    assert (server["Fast"]["vx_max"], server["Shim"]["vx_max"]) == (0.26, 0.8)
+    assert server["Dock"] == {"plugin": RPP}
+    assert "FollowPath" not in server
+    assert f"not {MPPI}: Dock. " in canbase("--params", str(tmp_path / "nav2_params.yaml")).stderr
+
+
+def test_odometry_is_that_of_the_filter_that_publishes_the_transform() -> None:
+    nodes = ("bt_navigator", "controller_server", "velocity_smoother")
+    filtered = parameters(robot(odometry__publish_tf=False))
+    assert {filtered[node, ROS, "odom_topic"] for node in nodes} == {"odometry/filtered"}
+    assert {parameters(robot())[node, ROS, "odom_topic"] for node in nodes} == {"odom"}
 
 
 @pytest.mark.parametrize(
@@ -280,7 +302,7 @@ def test_the_launch_file_puts_its_remappings_around_nav2s_own() -> None:
         args[0]: options.get("default_value") for name, args, options in made if name == "DeclareLaunchArgument"
     }
     assert declared == {
-        "params_file": None, "namespace": "robot1", "use_namespace": "true", "file": "bringup_launch.py"
+        "params_file": None, "namespace": "robot1", "use_namespace": "true"
     }  # fmt: skip
     group = next(args[0] for name, args, _ in made if name == "GroupAction")
     assert group == ["SetRemap"] * 5 + ["IncludeLaunchDescription"], "a remapping holds for what comes after it"

@@ -113,7 +113,7 @@ def test_laid_into_nav2s_own_file_it_is_that_file_with_our_values() -> None:
     assert {path[-1] for path in changed} >= {
         "cmd_vel_out_topic",
         "enable_stamped_cmd_vel",
-        "max_velocity",
+        "velocity_timeout",
         "footprint",
     }
 
