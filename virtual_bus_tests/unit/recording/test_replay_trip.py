@@ -128,6 +128,12 @@ def test_the_file_beside_a_stop_is_found_and_replayed(folder: Path) -> None:
     assert (code, "the same cause, in the same tick" in output) == (0, True)
 
 
+def test_the_explanation_names_the_file_of_a_watchdog_that_hung(folder: Path) -> None:
+    explained = CliRunner().invoke(app, ["explain", str(folder / "watchdog_hangs" / "watchdog_hangs.asc")])
+    assert "recorded a trip of its own: own loop did not run for 0.3" in explained.output
+    assert "watchdog_hangs/watchdog_watchdog_hangs_0.jsonl" in explained.output
+
+
 def test_the_file_of_another_stop_is_not_taken(folder: Path) -> None:
     stop = folder / "watchdog_hangs" / "watchdog_hangs.asc"
     inputs = read_stop(stop)
