@@ -68,6 +68,7 @@ def _named(file: YamlFile) -> dict[str, Path]:
 
 
 def _warnings(robot: Robot, file: YamlFile) -> Iterator[Problem]:
+    yield from file.notes
     busy = bus_load.busy(robot)
     if busy:
         at = next((loc for loc in (("bus", "bitrate"), ("rates", "control_hz")) if loc in file.lines), ("bus",))

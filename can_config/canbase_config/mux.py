@@ -49,6 +49,14 @@ class MuxSource(Section):
             description="without a message for longer: may start without a zero command; null: never [s]",
         ),
     ] = None
+    yields_after_zero_s: Annotated[
+        float | None,
+        Field(
+            ge=1.0,
+            le=60.0,
+            description="zero commands for longer: lower sources may drive, after a zero of theirs; null: never [s]",
+        ),
+    ] = None
     same_clock: Annotated[
         bool,
         Field(description="true: its stamps use this computer's clock, or one kept in step: their age is the delay"),
@@ -139,6 +147,10 @@ class Mux(Section):
         ),
     ] = None
 
+    twist_mux_rename: dict[Topic, Topic] = Field(
+        default_factory=dict, description="topics of these files, and their names here: {cmd_vel: cmd_vel_external}"
+    )
+
     @property
     def action_source(self) -> str:
         """Name of the source that receives the commands of goals; empty when there is none."""
@@ -165,7 +177,10 @@ class Mux(Section):
         self._no_two_alike("topic", lambda source: same_topic(source.topic))
         for name, source in self.sources.items():
             if same_topic(source.topic) in (*OUTPUTS, MEASURED):
-                message = f"{source.topic} is an output of this robot; a source needs another topic"
+                message = (
+                    f"{source.topic} is an output of this robot; a source needs another topic "
+                    "(mux.twist_mux_rename renames that of a twist_mux file)"
+                )
                 raise MisfitError(message, ("sources", name, "topic"))
         for name, lock in self.locks.items():
             self._check_lock(name, lock)

@@ -6,10 +6,10 @@ or in dotted keys (topics.joy.timeout: 0.5). A value outside of our ranges is re
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 from canbase_config.errors import ConfigError, Loc, Place, Problem, key_path
@@ -19,12 +19,19 @@ PARAMETERS: Final = "ros__parameters"
 USE_STAMPED: Final = "use_stamped"
 STAMPED_BY_DEFAULT: Final = True
 """As twist_mux since 4.4; older ones know Twist alone."""
+NODE: Final = "twist_mux"
+ROS_1: Final = "a list, as in files of ROS 1: in ROS 2 each entry has its name as the key"
 ENDLESS: Final = "twist_mux_timeout_s"
 """The key of `mux` with the timeout of topics that have none."""
+RENAME: Final = "twist_mux_rename"
+"""The key of `mux` with topics of these files, and what they are called here."""
 FIELDS: Final = {"topic": "topic", "timeout": "timeout_s", "priority": "priority"}
 """Keys of an entry, theirs and ours."""
 GROUPS: Final = {"topics": "sources", "locks": "locks"}
 EXAMPLE: Final = "twist_mux: {ros__parameters: {topics: {joystick: {topic: joy_vel, timeout: 0.5, priority: 100}}}}"
+
+_WILDCARD: Final = re.compile(r"/\\\*(\\\*)?")
+"""Of one name, or of any number of names, in the name of a node; escaped."""
 
 Entry = dict[str, "Parameter"]
 
@@ -49,10 +56,8 @@ def with_twist_mux(file: YamlFile) -> YamlFile:
     names = mux.get("twist_mux")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) and name for name in names):
         return file
-    parameters: dict[str, Parameter] = {}
-    for name in names:
-        parameters |= _parameters(file.path.parent / name)
-    return _merged(file, mux, parameters)
+    parameters = _renamed(file, mux.get(RENAME), _parameters([read_yaml(file.path.parent / name) for name in names]))
+    return replace(_merged(file, mux, parameters), notes=tuple(_unread(parameters)))
 
 
 def _merged(file: YamlFile, mux: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> YamlFile:
@@ -73,21 +78,79 @@ def _merged(file: YamlFile, mux: Mapping[str, Any], parameters: Mapping[str, Par
     return replace(file, values={**file.values, "mux": merged}, lines=lines, places=places)
 
 
-def _parameters(path: Path) -> dict[str, Parameter]:
-    """All parameters of the one node in the file that has topics or locks, by their dotted names."""
-    file = read_yaml(path)
-    found: dict[Loc, dict[str, Parameter]] = {}
-    for node, section, loc in _nodes(file.values, ()):
-        parameters = dict(_flat(section, loc, (), file))
-        if any(name.partition(".")[0] in GROUPS for name in parameters):
-            found[node] = parameters
-    if not found:
-        what = "has no topics and no locks of twist_mux"
-        raise ConfigError([Problem(str(path), None, "", what, hint=f"it should look like {EXAMPLE}")])
-    if len(found) > 1:
-        nodes = " and ".join("/".join(str(part) for part in node) for node in found)
-        raise ConfigError([Problem(str(path), None, "", f"has topics or locks of {nodes}; keep those of one node")])
-    return next(iter(found.values()))
+def _parameters(files: Sequence[YamlFile]) -> dict[str, Parameter]:
+    """All parameters of the one node in the files that has topics or locks, by their dotted names.
+
+    As in rclcpp (parameter_map.cpp) those of `/**` and the like belong to it as well, and of two values that one holds
+    whose node is named later.
+    """
+    nodes: dict[str, dict[str, Parameter]] = {}
+    for file in files:
+        for node, section, loc in _nodes(file.values, ()):
+            name = "/" + "/".join(str(part).strip("/") for part in node)
+            nodes.setdefault(name, {}).update(_flat(section, loc, (), file))
+    own = _own_node(nodes)
+    parameters: dict[str, Parameter] = {}
+    for name, given in nodes.items():
+        if re.fullmatch(_WILDCARD.sub(_any_names, re.escape(name)), own):
+            parameters |= given
+    _refuse_useless(files, parameters)
+    return parameters
+
+
+def _own_node(nodes: Mapping[str, Mapping[str, Parameter]]) -> str:
+    """The node that has topics or locks itself; where only `/**` has them, the one that is called twist_mux."""
+    named = [name for name, given in nodes.items() if "*" not in name and any(map(_in_a_group, given))]
+    if len(named) > 1:
+        place = next(iter(nodes[named[-1]].values())).place
+        both = " and ".join(name.strip("/") for name in named)
+        raise ConfigError([Problem(place.file, None, "", f"has topics or locks of {both}; keep those of one node")])
+    return next(iter(named), next((name for name in nodes if name.endswith(f"/{NODE}")), f"/{NODE}"))
+
+
+def _any_names(wildcard: re.Match[str]) -> str:
+    return rf"(/\w+){'*' if wildcard[1] else ''}"
+
+
+def _in_a_group(dotted: str) -> bool:
+    return dotted.partition(".")[0] in GROUPS
+
+
+def _refuse_useless(files: Sequence[YamlFile], parameters: Mapping[str, Parameter]) -> None:
+    """A file of another node, and all where no topics and locks are left."""
+    useful = {parameter.place.file for parameter in parameters.values()} if any(map(_in_a_group, parameters)) else ()
+    for file in files:
+        if str(file.path) not in useful:
+            old = next((group for group in GROUPS if isinstance(file.values.get(group), list)), None)
+            what = "has no topics and no locks of twist_mux" if old is None else f"{old} is {ROS_1}"
+            raise ConfigError([Problem(str(file.path), None, "", what, hint=f"it should look like {EXAMPLE}")])
+
+
+def _renamed(file: YamlFile, rename: Any, parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """With the topics as mux.twist_mux_rename has them; what is no section is reported by the model."""
+    names = {str(topic).removeprefix("/"): name for topic, name in rename.items()} if isinstance(rename, dict) else {}
+    topics = {
+        dotted: str(parameter.value).removeprefix("/")
+        for dotted, parameter in parameters.items()
+        if _in_a_group(dotted) and dotted.endswith(".topic")
+    }
+    if unknown := sorted(set(names) - set(topics.values())):
+        place = file.place(("mux", RENAME))
+        raise ConfigError([Problem(place.file, place.line, place.key, f"no topic of these files is {unknown[0]}")])
+    return {
+        dotted: replace(parameter, value=names.get(topics.get(dotted, ""), parameter.value))
+        for dotted, parameter in parameters.items()
+    }
+
+
+def _unread(parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
+    """Keys of topics and locks that neither twist_mux nor canbase reads."""
+    for dotted, parameter in parameters.items():
+        field = dotted.rpartition(".")[2]
+        if _in_a_group(dotted) and field not in FIELDS:
+            use = f"; {USE_STAMPED} beside topics holds for all of them" if field == "stamped" else ""
+            place = parameter.place
+            yield Problem(place.file, place.line, place.key, f"is not read, as in twist_mux{use}")
 
 
 def _nodes(values: Any, loc: Loc) -> Iterator[tuple[Loc, Mapping[str, Any], Loc]]:
@@ -118,6 +181,7 @@ def _entries(parameters: Mapping[str, Parameter], group: str) -> dict[str, Entry
         name, _, field = rest.rpartition(".")
         if first == group and not name:
             what = f"{first} must hold entries with {', '.join(FIELDS)}"
+            what = f"{first} is {ROS_1}" if isinstance(parameter.value, list) else what
             raise ConfigError([Problem(parameter.place.file, parameter.place.line, dotted, what)])
         if first == group:
             entries.setdefault(name, {})[field] = parameter

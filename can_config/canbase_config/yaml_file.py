@@ -38,13 +38,14 @@ _CoreConstructor.yaml_constructors = {
 class YamlFile:
     """The content of a file. `lines`: for every key and every list entry its line, counted from 1.
 
-    `places`: of what another file has contributed, where it stands there.
+    `places`: of what another file has contributed, where it stands there. `notes`: what is not used of that file.
     """
 
     path: Path
     values: Mapping[str, Any]
     lines: Mapping[Loc, int]
     places: Mapping[Loc, Place] = field(default_factory=dict)
+    notes: tuple[Problem, ...] = ()
 
     def line(self, loc: Loc) -> int | None:
         """Line of `loc`, or of the innermost section around it that the file has; None: the top of the file."""

@@ -178,7 +178,8 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
     ),
     "the measured wheel speeds as a source": (
         {END: "mux:\n  sources:\n    a: {topic: /joint_states, type: joint_command, priority: 1, timeout_s: 0.1}"},
-        ":38: mux.sources.a.topic: /joint_states is an output of this robot; a source needs another topic",
+        ":38: mux.sources.a.topic: /joint_states is an output of this robot; a source needs another topic "
+        "(mux.twist_mux_rename renames that of a twist_mux file)",
     ),
     "a source of an unknown type": (
         {END: "mux:\n  sources:\n    a: {topic: x, type: joints, priority: 1, timeout_s: 0.1}"},

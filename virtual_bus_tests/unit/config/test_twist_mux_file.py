@@ -61,6 +61,16 @@ a200_0000:
       locks.e_stop.timeout: 0.0
       locks.e_stop.priority: 255
 """
+ORIGINAL = """\
+twist_mux:
+  ros__parameters:
+    topics:
+      navigation: {topic: nav_vel, timeout: 0.5, priority: 10}
+      joystick: {topic: joy_vel, timeout: 0.5, priority: 100}
+      keyboard: {topic: key_vel, timeout: 0.5, priority: 90}
+      tablet: {topic: tab_vel, timeout: 0.5, priority: 100}
+"""
+"""The topics of twist_mux 4.3.0's own sample: two with priority 100."""
 
 
 def mux_of(folder: Path, *files: str, also: str = "") -> Mux:
@@ -109,6 +119,65 @@ def test_a_later_file_has_the_last_word_on_single_values_as_ros_has_it(tmp_path:
     assert mux.sources["navigation"].stamped is True
 
 
+STAMPED_ALONE = "NODE:\n  ros__parameters: {use_stamped: VALUE}\n"
+
+
+@pytest.mark.parametrize(
+    ("files", "stamped"),
+    [
+        ((f"{STAMPED_ALONE.replace('NODE', '/**').replace('VALUE', 'false')}{ORIGINAL}",), False),
+        ((ORIGINAL, STAMPED_ALONE.replace("NODE", "twist_mux").replace("VALUE", "false")), False),
+        ((ORIGINAL, STAMPED_ALONE.replace("NODE", "/*").replace("VALUE", "false")), False),
+        ((TOPICS, STAMPED_ALONE.replace("NODE", "/twist_mux").replace("VALUE", "true")), True),
+        (("/**: {ros__parameters: {use_stamped: true}}\n" + TOPICS,), False),
+        (("teleop: {ros__parameters: {use_stamped: false}}\n" + ORIGINAL,), True),
+        (("/**:\n" + ORIGINAL.partition("\n")[2], STAMPED_ALONE.replace("NODE", "twist_mux").replace("VALUE", "false")),
+         False),
+    ],
+)  # fmt: skip
+def test_use_stamped_is_read_from_each_node_name_that_means_this_node(
+    tmp_path: Path, files: tuple[str, ...], stamped: bool
+) -> None:
+    sources = mux_of(tmp_path, *files, also="  equal_priorities: by_name\n").sources
+    assert {source.stamped for source in sources.values()} == {stamped}
+
+
+@pytest.mark.parametrize("node", ["'**+('", "/***", "/**/joy", "teleop"])
+def test_a_file_of_no_such_node_is_refused(tmp_path: Path, node: str) -> None:
+    alone = STAMPED_ALONE.replace("NODE", node).replace("VALUE", "true")
+    assert "mux1.yaml: has no topics and no locks" in refusal(tmp_path, TOPICS, alone)
+
+
+def test_a_key_that_is_not_read_is_named(tmp_path: Path) -> None:
+    (tmp_path / "mux.yaml").write_text(TOPICS + "        stamped: true\n        short_desc: pad\n", encoding="utf-8")
+    loaded = load_robot(write(tmp_path, {END: "mux: {twist_mux: [mux.yaml]}"}))
+    told = [str(each).replace(f"{tmp_path}/", "") for each in loaded.warnings if "is not read" in str(each)]
+    assert told == [
+        "mux.yaml:14: topics.joystick.stamped: is not read, as in twist_mux; use_stamped beside topics holds for all "
+        "of them",
+        "mux.yaml:15: topics.joystick.short_desc: is not read, as in twist_mux",
+    ]
+
+
+def test_a_topic_that_is_an_output_here_is_renamed_by_a_key(tmp_path: Path) -> None:
+    text = TOPICS.replace("joy_vel", "/cmd_vel")
+    assert "mux.twist_mux_rename renames" in refusal(tmp_path, text)
+    mux = mux_of(tmp_path, text, also="  twist_mux_rename: {cmd_vel: cmd_vel_external}\n")
+    assert [source.topic for source in mux.sources.values()] == ["nav_vel", "cmd_vel_external"]
+    (tmp_path / "effective.yaml").write_text(effective(load_robot(tmp_path / "robot.yaml")), encoding="utf-8")
+    assert load_robot(tmp_path / "effective.yaml").robot.mux == mux
+    unknown = refusal(tmp_path, text, also="  twist_mux_rename: {cmd_vel: external, key_vel: keys}\n")
+    assert "robot.yaml:38: mux.twist_mux_rename: no topic of these files is key_vel" in unknown
+    assert "mux.twist_mux_rename: got 3" in refusal(tmp_path, TOPICS, also="  twist_mux_rename: 3\n")
+
+
+@pytest.mark.parametrize("head", ["", "twist_mux:\n  ros__parameters:\n"])
+def test_a_list_of_ros_1_is_named(tmp_path: Path, head: str) -> None:
+    indent = "    " if head else ""
+    text = f"{head}{indent}topics:\n{indent}- {{name: joy, topic: joy_vel, timeout: 0.5, priority: 100}}\n"
+    assert "topics is a list, as in files of ROS 1" in refusal(tmp_path, text)
+
+
 def test_sources_of_robot_yaml_come_to_those_of_the_files(tmp_path: Path) -> None:
     own = "  sources:\n    action: {topic: cmd_vel_action, priority: 40, timeout_s: 0.3}\n"
     assert list(mux_of(tmp_path, TOPICS, also=own).sources) == ["action", "navigation", "joystick"]
@@ -146,18 +215,6 @@ def test_the_effective_configuration_spells_them_out_and_loads_without_the_files
 def test_what_is_wrong_is_told_with_the_files_own_line_and_key(tmp_path: Path, old: str, new: str, text: str) -> None:
     assert old in TOPICS
     assert text in refusal(tmp_path, TOPICS.replace(old, new))
-
-
-ORIGINAL = """\
-twist_mux:
-  ros__parameters:
-    topics:
-      navigation: {topic: nav_vel, timeout: 0.5, priority: 10}
-      joystick: {topic: joy_vel, timeout: 0.5, priority: 100}
-      keyboard: {topic: key_vel, timeout: 0.5, priority: 90}
-      tablet: {topic: tab_vel, timeout: 0.5, priority: 100}
-"""
-"""The topics of twist_mux 4.3.0's own sample: two with priority 100."""
 
 
 def test_equal_priorities_are_accepted_by_a_key_and_the_first_by_name_is_active(tmp_path: Path) -> None:
