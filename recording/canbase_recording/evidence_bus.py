@@ -143,7 +143,7 @@ def drives_deaf(scene: Scene) -> Found | None:
     if not codes or since_s > max(LEAST_SILENCE_S, LOST_PERIODS * scene.period_s) or not scene.syncs:
         return None
     quiet = [at for node in codes if (at := _no_answer_since(scene, node)) is not None]
-    at_s = min(quiet, default=min(at for at, _ in codes.values()))
+    at_s = min(quiet, default=math.inf)
     if at_s > scene.reaction_s:
         return None
     whom = " and ".join(scene.who(node) for node in sorted(codes))

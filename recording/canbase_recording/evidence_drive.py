@@ -20,9 +20,12 @@ _FAULTS: Final = (DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT)
 
 
 def drive_fault(scene: Scene) -> Found | None:
-    """A drive enters fault, or reports an error by EMCY."""
+    """A drive enters fault, or one that had power reports an error by EMCY."""
     signs = [sign for trace in scene.axes.values() if (sign := _enters_fault(scene, trace)) is not None]
+    powered = {trace.node_id for trace in scene.enabled_axes()}
     for at_s, (node_id, code) in emergencies_before(scene):
+        if node_id not in powered:
+            continue
         signs.append(Found(at_s, f"{scene.who(node_id)} reports {code:04X}h {emcy_text(code)}", node_id))
     if not signs:
         return None

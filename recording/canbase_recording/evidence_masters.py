@@ -11,8 +11,8 @@ from canbase_driver.cia301.nmt import TPDO
 from canbase_driver.cia402 import DriveState
 from canbase_recording.cause import Found
 from canbase_recording.frame_words import nmt_text
-from canbase_recording.scene import Scene
-from canbase_recording.trace import last_before, times_between
+from canbase_recording.scene import SILENT_PERIODS, Scene
+from canbase_recording.trace import between, last_before, times_between
 
 SIGNS: Final = 3
 """Once may be a frame that was late or lost."""
@@ -45,9 +45,13 @@ def _foreign_nmt(scene: Scene) -> Found | None:
 
 
 def _has_power(scene: Scene, node_id: int, at_s: float) -> bool:
-    """Whether a node, 0: any, reported operation enabled at this time."""
-    traces = [trace for trace in scene.axes.values() if node_id in (0, trace.node_id)]
-    return any(trace.state_at(at_s) is DriveState.OPERATION_ENABLED for trace in traces)
+    """Whether a node, 0: any, reported operation enabled at this time, and not only long ago."""
+    since_s = at_s - SILENT_PERIODS * scene.period_s
+    return any(
+        trace.state_at(at_s) is DriveState.OPERATION_ENABLED and bool(between(trace.status, since_s, at_s))
+        for trace in scene.axes.values()
+        if node_id in (0, trace.node_id)
+    )
 
 
 def _two_setpoints(scene: Scene) -> Found | None:

@@ -13,7 +13,7 @@ from typing import Final
 from canbase_driver.cia402 import DriveState
 from canbase_recording.cause import Found
 from canbase_recording.scene import Scene
-from canbase_recording.trace import AxisTrace, around, between, last_before, wrapped
+from canbase_recording.trace import AxisTrace, around, between, last_before, value_at, wrapped
 
 LOOK_BACK_S: Final = 2.5
 """The watchdog's slowest rule about one wheel takes about so long."""
@@ -67,9 +67,10 @@ def velocity_stuck(scene: Scene) -> Found | None:
     for trace in _moved(scene):
         changed_s = trace.last_change(trace.velocity, scene.reaction_s)
         samples = between(trace.velocity, (scene.began_s if changed_s is None else changed_s) - 1e-9, scene.reaction_s)
-        if len(samples) < SAMPLES or not trace.has_units or _stands_since(trace, scene) is not None:
+        scale = 1.0 if trace.has_units else _counts_of_606c(trace, samples[0][0] if samples else scene.began_s)
+        if len(samples) < SAMPLES or scale is None or _stands_since(trace, scene) is not None:
             continue
-        shown = trace.speed(samples[-1][1])
+        shown = trace.speed(samples[-1][1]) * scale
         since_s = _differs_since(trace, shown, [at_s for at_s, _ in samples])
         still = abs(shown) <= _moves(trace) or len(samples) >= STUCK_SAMPLES
         real = _rate(trace, samples[-SAMPLES][0] - ROUNDING_S, scene.reaction_s)
@@ -80,6 +81,19 @@ def velocity_stuck(scene: Scene) -> Found | None:
 
 
 ROUNDING_S: Final = 0.002
+
+
+def _counts_of_606c(trace: AxisTrace, until_s: float) -> float | None:
+    """Increments a second for each unit of 606Ch, by what came before; None: it did not move."""
+    counted = shown = 0.0
+    for (a_s, a), (b_s, b) in itertools.pairwise(between(trace.position, -math.inf, until_s - ROUNDING_S)):
+        counted += abs(wrapped(b - a))
+        velocity = value_at(trace.velocity, b_s)
+        shown += abs(velocity or 0) * (b_s - a_s)
+    return counted / shown if counted >= LEAST_COUNTS and shown else None
+
+
+LEAST_COUNTS: Final = 100.0
 
 
 def _differs_since(trace: AxisTrace, shown: float, times: list[float]) -> float | None:

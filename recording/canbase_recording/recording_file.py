@@ -157,7 +157,7 @@ class RecordingFile:
         ):
             if head.startswith(begin):
                 return name, read
-        if self.path.suffix.lower() == ".trc" or first.startswith(";$FILEVERSION"):
+        if first.startswith(";") and (self.path.suffix.lower() == ".trc" or first.startswith(";$FILEVERSION")):
             return "TRC", lambda: self._by_lines(can.TRCReader, is_asc=False)
         if _SCREEN.match(first):
             return "candump", self._screen
@@ -261,8 +261,9 @@ class RecordingFile:
             self.problems.broken += 1
             return self._last_s
         if math.isnan(self._raw_last_s):
-            self._shift_s = 0.0 if self.format in RELATIVE else -raw_s
-            self.began_s = self.began_s if self.format in RELATIVE else raw_s
+            relative = self.format in RELATIVE and raw_s < DATED_S
+            self._shift_s = 0.0 if relative else -raw_s
+            self.began_s = self.began_s if relative else raw_s
             self._raw_last_s = raw_s
         step_s = raw_s - self._raw_last_s
         if step_s < -CLOCK_STEP_S:
@@ -286,7 +287,9 @@ MOST_IDENTIFIERS: Final = 1 << 29
 NOTE_LENGTH: Final = 1_200
 """Characters; those of canbase are shorter."""
 RELATIVE: Final = ("ASC", "TRC")
-"""Formats whose times begin with the recording."""
+"""Formats whose times begin with the recording ..."""
+DATED_S: Final = 100_000_000.0
+"""... except in a TRC file with the date of its start: then its times are seconds since 1970."""
 _DATES: Final = (
     "%a %b %d %H:%M:%S.%f %Y",
     "%a %b %d %H:%M:%S %Y",

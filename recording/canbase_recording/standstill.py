@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass
 from typing import Final
 
-from canbase_recording.scene import Scene
+from canbase_recording.scene import SILENT_PERIODS, Scene
 from canbase_recording.trace import AxisTrace, around, between, last_before, value_at, wrapped
 
 STANDS_SHARE: Final = 0.02
@@ -57,21 +57,35 @@ def _wheel(trace: AxisTrace, scene: Scene, since_s: float) -> WheelStop:
     last_s = last_before([at for at, _ in trace.position], scene.ended_s)
     if last_s < scene.ended_s - 0.5:
         return WheelStop(trace.name, None, None, unit, f"6064h ends at {last_s:.3f} s")
-    moved_s = _last_motion(trace, scene, since_s)
+    steps = _steps(trace, scene, since_s)
+    moved_s = _last_motion(trace, scene, since_s, steps)
     if moved_s >= last_s:
         return WheelStop(trace.name, None, trace.travel(since_s, last_s), unit, "it still moves at the end")
+    gap = next(((a_s, b_s) for a_s, b_s, _ in steps if a_s < moved_s and _is_gap(scene, a_s, b_s)), None)
+    if gap is not None:
+        return WheelStop(trace.name, None, None, unit, f"6064h is missing from {gap[0]:.3f} to {gap[1]:.3f} s")
     return WheelStop(trace.name, max(0.0, moved_s - since_s), trace.travel(since_s, moved_s), unit)
 
 
-def _last_motion(trace: AxisTrace, scene: Scene, since_s: float) -> float:
+def _steps(trace: AxisTrace, scene: Scene, since_s: float) -> list[tuple[float, float, float]]:
+    """Begin, end and speed of each step of 6064h; over a gap as if it were one period: nothing is averaged away."""
+    found = []
+    for (a_s, a), (b_s, b) in itertools.pairwise(around(trace.position, since_s, scene.ended_s)):
+        seconds = scene.period_s if _is_gap(scene, a_s, b_s) else max(b_s - a_s, scene.period_s)
+        found.append((a_s, b_s, abs(trace.way(wrapped(b - a))) / seconds))
+    return found
+
+
+def _is_gap(scene: Scene, since_s: float, until_s: float) -> bool:
+    return until_s - since_s > SILENT_PERIODS * scene.period_s
+
+
+def _last_motion(trace: AxisTrace, scene: Scene, since_s: float, steps: list[tuple[float, float, float]]) -> float:
     """The last time at which the wheel did not stand: 606Ch above the limit, or 6064h contradicts it (docs/bus.md)."""
-    steps = [
-        (b_s, abs(trace.way(wrapped(b - a))) / max(b_s - a_s, scene.period_s))
-        for (a_s, a), (b_s, b) in itertools.pairwise(around(trace.position, since_s, scene.ended_s))
-    ]
-    limit = _limit(trace, scene, max((speed for _, speed in steps), default=0.0))
+    usual = [speed for a_s, b_s, speed in steps if not _is_gap(scene, a_s, b_s)]
+    limit = _limit(trace, scene, max(usual, default=0.0))
     moved_s = since_s
-    for at_s, speed in steps:
+    for _, at_s, speed in steps:
         shown = value_at(trace.velocity, at_s + scene.period_s / 2.0)
         stands = speed <= limit if shown is None else _is_slow(trace, scene, shown) and speed <= CONTRADICTS * limit
         if not stands:
