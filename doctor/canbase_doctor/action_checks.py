@@ -33,27 +33,34 @@ _AFTER_STOPPING = (GoalStep.STANDSTILL, GoalStep.ENDED)
 
 
 def server_process(seen: Evidence) -> Check:
-    """Is there a server at all, on this computer or elsewhere?"""
-    name = "the server's process"
-    here = [str(process.pid) for process in seen.processes]
+    """Is there a server of this robot at all, on this computer or elsewhere?"""
+    name, robot = "the server's process", seen.robot.name
+    here = [str(process.pid) for process in seen.own_processes]
     if here:
         return ok(name, f"runs on this computer, process {', '.join(here)}")
-    if any(action.endswith(f"/{ACTION}") for action in seen.servers):
+    if seen.whole_name(ACTION) in seen.servers:
         return ok(name, "runs on another computer, or as another user")
-    return fail(
-        name, "none runs on this computer, and none is seen", "canbase up, or canbase serve action-server; see its log"
-    )
+    others = [f"process {process.pid} is that of {process.robot}" for process in seen.processes]
+    elsewhere = _elsewhere(seen)
+    found = "; ".join([f"none of {robot} runs on this computer, and none is seen", *others, *elsewhere])
+    advice = "canbase up, or canbase serve action-server; see its log"
+    return fail(name, found, f"{advice}. If {elsewhere[0]} is {robot}: --namespace" if elsewhere else advice)
+
+
+def _elsewhere(seen: Evidence) -> list[str]:
+    """The names that the action has in other namespaces, maybe by servers of other robots."""
+    return sorted(action for action in seen.servers if action.endswith(f"/{ACTION}"))
 
 
 def server_name(seen: Evidence) -> Check:
     """Is it offered under the name that was looked for?"""
-    name, wanted = "name and namespace", seen.whole_name(ACTION)
-    others = sorted(action for action in seen.servers if action.endswith(f"/{ACTION}"))
+    name, wanted, others = "name and namespace", seen.whole_name(ACTION), _elsewhere(seen)
     if wanted in others:
         return ok(name, wanted)
     if not others:
         return warn(name, f"no server offers {ACTION} under any name here", "see the next check")
-    return fail(name, f"not {wanted}, but {', '.join(others)}", f"use --namespace {others[0].rsplit('/', 1)[0]}")
+    spaces = " or ".join(other.rsplit("/", 1)[0] or "/" for other in others)
+    return fail(name, f"not {wanted}, but {', '.join(others)}", f"use --namespace {spaces}, that of {seen.robot.name}")
 
 
 def domain(seen: Evidence) -> Check:
@@ -61,7 +68,7 @@ def domain(seen: Evidence) -> Check:
     name, ours = "domain and network", settings(seen.environment)
     if seen.whole_name(ACTION) in seen.servers:
         return ok(name, f"seen with ROS_DOMAIN_ID {ours['ROS_DOMAIN_ID']}")
-    for process in seen.processes:
+    for process in seen.own_processes:
         theirs = settings(process.environment)
         apart = [f"{key} is {theirs[key] or 'not set'} there, {ours[key] or 'not set'} here" for key in SETTINGS
                  if theirs[key] != ours[key]]  # fmt: skip
@@ -119,8 +126,11 @@ def busy_or_unsafe(seen: Evidence) -> Check:
 def goal_executes(seen: Evidence) -> Check:
     """Has the execute callback of a goal been entered?"""
     name = "a goal executes"
-    if seen.running:
+    if seen.running and _answers(seen):
         return ok(name, f"{seen.running[0].uuid} of {seen.running[0].action}")
+    if not _answers(seen):
+        found = "the server does not answer: whether a goal runs is unknown"
+        return fail(name, found, "canbase doctor --symptom no-result")
     if any(goal.status == Goal.ACCEPTED for goal in seen.goals):
         return fail(name, "accepted, but it waits for another goal", "action.goal_policy decides this")
     return fail(name, "none runs now", "send a goal, and call doctor while it runs")
@@ -189,9 +199,9 @@ def stop_procedure(seen: Evidence) -> Check:
 
 def server_answers(seen: Evidence) -> Check:
     """Is the server alive?"""
-    name, times_s = "the server answers", seen.answers.question_s
-    if any(math.isfinite(time_s) for time_s in times_s):
-        return ok(name, f"{len(times_s)} questions")
+    name = "the server answers"
+    if _answers(seen):
+        return ok(name, f"{len(seen.answers.question_s)} questions")
     return fail(
         name,
         "to nothing: it ended, or hangs",
@@ -272,6 +282,10 @@ def _behavior(robot: Robot, goal: Mapping[str, Any]) -> DriveRequest | RotateReq
         return spin(robot, goal["target_yaw"], 0.0).motion_request
     behavior = back_up if goal["action"] == "backup" else drive_on_heading
     return behavior(robot, Target(goal["target.x"]), goal["speed"], 0.0).motion_request
+
+
+def _answers(seen: Evidence) -> bool:
+    return any(math.isfinite(time_s) for time_s in seen.answers.question_s)
 
 
 def _finite(goal: Any) -> bool:

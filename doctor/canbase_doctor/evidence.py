@@ -108,10 +108,14 @@ class LoggedStep:
 
 @dataclass(frozen=True, slots=True)
 class ServerProcess:
-    """A process of the action server on this computer, and what of its environment decides which peers it reaches."""
+    """A process of the action server on this computer, and what of its environment decides which peers it reaches.
+
+    `robot`: the name in its robot.yaml; empty: unknown.
+    """
 
     pid: int
     environment: Mapping[str, str]
+    robot: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +172,11 @@ class Evidence:
     def whole_name(self, name: str) -> str:
         """`name` with the robot's namespace."""
         return f"{self.namespace.rstrip('/')}/{name}"
+
+    @property
+    def own_processes(self) -> tuple[ServerProcess, ...]:
+        """Without those of other robots."""
+        return tuple(process for process in self.processes if process.robot in ("", self.robot.name))
 
     @property
     def running(self) -> tuple[Goal, ...]:

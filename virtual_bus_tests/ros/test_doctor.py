@@ -141,6 +141,7 @@ def test_no_result_the_server_hangs(healthy: Clinic) -> None:
     healthy.server.stop()
     try:
         assert healthy.first_failure("no-result") == "the server answers"
+        assert "whether a goal runs is unknown" in healthy.doctor("--symptom", "no-feedback")[-1]["found"]
     finally:
         healthy.server.resume()
 

@@ -181,10 +181,18 @@ STAMPED, BARE = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 OLD = Time(sec=WALL_S - 100)
 NOT_ASKED = replace(HEALTHY, answers=Answers())
+HUNG = replace(RUNNING, answers=Answers((math.inf,), ()))
+OF_ANOTHER = replace(ELSEWHERE, processes=(ServerProcess(7, {}, "other"),))
+BOTH = replace(ELSEWHERE, processes=(ServerProcess(7, {}, "other"), ServerProcess(8, {}, ROBOT.name)))
 
 BROKEN = [
     ("not-listed", replace(UNSEEN, processes=()), "the server's process", "canbase up"),
     ("not-listed", ELSEWHERE, "name and namespace", "--namespace /robot2"),
+    ("not-listed", OF_ANOTHER, "the server's process", f"none of {ROBOT.name} runs on this computer, and none is seen; "
+     "process 7 is that of other; /robot2/drive_distance"),
+    ("not-listed", BOTH, "name and namespace", f"--namespace /robot2, that of {ROBOT.name}"),
+    ("not-listed", replace(OTHER_DOMAIN, processes=(ServerProcess(6, {"ROS_DOMAIN_ID": "9"}, "other"),
+     *OTHER_DOMAIN.processes)), "domain and network", "process 7: ROS_DOMAIN_ID is 5 there"),
     ("not-listed", OTHER_DOMAIN, "domain and network", "5 there, 0"),
     ("not-listed", UNSEEN, "domain and network", "same settings"),
     ("rejected", rejected(distance_m=100.0, max_speed_mps=0.2), "range of the goal", "|distance_m| is 100"),
@@ -192,6 +200,8 @@ BROKEN = [
     ("rejected", rejected(distance_m=math.nan, max_speed_mps=0.2), "NaN and infinity", "nan"),
     ("rejected", RUNNING, "busy, or not safe to start", "busy: goal ab"),
     ("rejected", replace(HEALTHY, inputs=Inputs()), "busy, or not safe to start", "odom"),
+    ("no-feedback", HUNG, "a goal executes", "whether a goal runs is unknown"),
+    ("no-feedback", replace(NOT_ASKED, goals=()), "a goal executes", "does not answer"),
     ("no-feedback", HEALTHY, "a goal executes", "none runs"),
     ("no-feedback", replace(HEALTHY, goals=(replace(RUNS, status=1),)), "a goal executes", "waits"),
     ("no-feedback", but(RUNNING, **{FEEDBACK: Heard()}), "feedback is published", "0.0 Hz instead of 10"),
@@ -318,13 +328,15 @@ def process(proc: Path, pid: int, words: list[str], environment: Mapping[str, st
 def test_servers_are_found_among_all_processes_with_what_decides_whom_they_talk_to(tmp_path: Path) -> None:
     domain = {"ROS_DOMAIN_ID": "5", "SECRET": "x"}
     process(tmp_path, 10, ["python", "-m", "canbase_cli.child", "9", "action-server", "--config", "a"], domain)
+    (tmp_path / "10" / "cwd").mkdir()
+    (tmp_path / "10" / "cwd" / "a").write_text("name: robot_a\n", encoding="utf-8")
     process(tmp_path, 11, ["/usr/bin/canbase", "action-server"], {})
     process(tmp_path, 12, ["/usr/bin/canbase", "driver"], domain)
     process(tmp_path, 13, ["less", "action-server"], domain)
     (tmp_path / "14").mkdir()  # it ended between two looks
     process(tmp_path, 15, ["/usr/bin/python3", "/opt/ws/lib/canbase/drive_distance_server", "--config", "a"], {})
     process(tmp_path, 16, ["bash", "/usr/bin/canbase", "action-server"], domain)  # called as if it were one
-    found = (ServerProcess(10, {"ROS_DOMAIN_ID": "5"}), ServerProcess(11, {}), ServerProcess(15, {}))
+    found = (ServerProcess(10, {"ROS_DOMAIN_ID": "5"}, "robot_a"), ServerProcess(11, {}), ServerProcess(15, {}))
     assert server_processes(tmp_path) == found
     assert talks_by(99, tmp_path) == {}
 
