@@ -3,14 +3,15 @@
 This package does not know the driver; a test compares both. Rules, as in canbase_driver/motion/limiter.py:
 1. The velocity moves along the straight line to the order in the (v, w) plane; the slower axis sets the time. Only
    braking does not wait for a turn that grows.
-2. An acceleration away from the order ends at once. A reversal brakes to an exact zero first.
+2. An acceleration away from the order ends at once. A reversal brakes to an exact zero first, a turn that reverses
+   beside braking with its own deceleration, off the line.
 3. jerk_mps3 rounds the begin and the end of each change of the linear velocity; a turn in place has no jerk limit.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canbase_config.robot import Limits
 from canbase_velocity.twist import ZERO, Twist
@@ -34,8 +35,13 @@ AT_REST = Moving(ZERO)
 
 def follow(moving: Moving, order: Twist, limits: Limits, dt_s: float) -> Moving:
     """`dt_s` later, on the way to `order`. A step that reaches zero on the way to a reversal ends there."""
-    twist = moving.twist
-    goal, ramp_s = _line(twist, _waypoint(twist, order), limits)
+    twist, waypoint = moving.twist, _waypoint(moving.twist, order)
+    if _slows(twist.linear_mps, waypoint.linear_mps) and twist.angular_radps * waypoint.angular_radps < 0.0:
+        straight = follow(moving, Twist(waypoint.linear_mps, twist.angular_radps), limits, dt_s)
+        left_radps = max(0.0, abs(twist.angular_radps) - limits.angular_deceleration_radps2 * max(dt_s, 0.0))
+        turn_radps = math.copysign(left_radps, twist.angular_radps)
+        return replace(straight, twist=_without_residue(Twist(straight.twist.linear_mps, turn_radps)))
+    goal, ramp_s = _line(twist, waypoint, limits)
     if ramp_s <= 0.0 or dt_s <= 0.0:
         return Moving(goal) if ramp_s <= 0.0 else moving
     change_mps = goal.linear_mps - twist.linear_mps
@@ -70,11 +76,7 @@ def _line(start: Twist, end: Twist, limits: Limits) -> tuple[Twist, float]:
     turn, turn_to = start.angular_radps, end.angular_radps
     angular_s = _axis_s(turn, turn_to, limits.angular_acceleration_radps2, limits.angular_deceleration_radps2)
     if _slows(start.linear_mps, end.linear_mps) and angular_s > linear_s and not _slows(turn, turn_to):
-        turned_to = _between(start, end, linear_s / angular_s).angular_radps
-        if turn * turn_to < 0.0:
-            left_radps = abs(turn) - limits.angular_deceleration_radps2 * linear_s
-            turned_to = math.copysign(max(0.0, left_radps), turn)
-        return Twist(end.linear_mps, turned_to), linear_s
+        return Twist(end.linear_mps, _between(start, end, linear_s / angular_s).angular_radps), linear_s
     return end, max(linear_s, angular_s)
 
 

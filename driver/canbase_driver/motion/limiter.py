@@ -4,7 +4,8 @@ Four rules, in the order of their weight:
 1. The path's curvature (w / v) is kept: a target that is too fast is scaled as a whole, and the velocity moves along
    the straight line from the present to the target in the (v, w) plane. A stop follows the arc that the base is on.
 2. Braking is never put off: an acceleration away from a new target is dropped at once, a turn that grows is not waited
-   for, and the jerk limit lengthens a stop by deceleration / jerk at most. A reversal brakes to an exact zero first.
+   for, and the jerk limit lengthens a stop by deceleration / jerk at most. A reversal brakes to an exact zero first;
+   a turn that reverses while the base brakes does so with its own deceleration, off the straight line.
 3. The target is reached exactly and never passed: when it comes too near for the jerk limit, the acceleration drops at
    once to what the jerk limit can still take back in time.
 4. An emergency stop that has begun goes on to zero, whatever is requested meanwhile.
@@ -13,7 +14,7 @@ Four rules, in the order of their weight:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from canbase_config.robot import Limits
@@ -92,7 +93,18 @@ class Limiter:
             return current
         if goal == current.twist:
             return MotionState(goal)
-        return self._advance(current, goal, min(dt_s, LONGEST_RAMP_STEP_S), emergency)
+        dt_s = min(dt_s, LONGEST_RAMP_STEP_S)
+        if _slows(current.twist.linear_mps, goal.linear_mps) and current.twist.angular_radps * goal.angular_radps < 0.0:
+            return self._brake_apart(current, goal, dt_s)
+        return self._advance(current, goal, dt_s, emergency)
+
+    def _brake_apart(self, current: MotionState, goal: Twist2D, dt_s: float) -> MotionState:
+        """Braking, and a turn that reverses: each goes towards zero with its own deceleration, none waits."""
+        straight = Twist2D(goal.linear_mps, current.twist.angular_radps)
+        reached = self._advance(current, straight, dt_s, emergency=False)
+        left_radps = abs(current.twist.angular_radps) - self.limits.angular_deceleration_radps2 * dt_s
+        turn_radps = math.copysign(max(0.0, left_radps), current.twist.angular_radps)
+        return replace(reached, twist=_without_residue(Twist2D(reached.twist.linear_mps, turn_radps)))
 
     def _advance(self, current: MotionState, goal: Twist2D, dt_s: float, emergency: bool) -> MotionState:
         """`dt_s` along the straight line to `goal`, on which the linear velocity does not change its sign."""
@@ -131,11 +143,7 @@ class Limiter:
         )
         brakes = _slows(current.linear_mps, goal.linear_mps)
         if brakes and angular_s > linear_s and not _slows(current.angular_radps, goal.angular_radps):
-            turn_radps = _between(current, goal, linear_s / angular_s).angular_radps
-            if current.angular_radps * goal.angular_radps < 0.0:
-                left_radps = abs(current.angular_radps) - limits.angular_deceleration_radps2 * linear_s
-                turn_radps = math.copysign(max(0.0, left_radps), current.angular_radps)
-            return Twist2D(goal.linear_mps, turn_radps), linear_s
+            return Twist2D(goal.linear_mps, _between(current, goal, linear_s / angular_s).angular_radps), linear_s
         shortening = limits.deceleration_mps2 / limits.emergency_deceleration_mps2 if emergency else 1.0
         return goal, max(linear_s, angular_s) * shortening
 

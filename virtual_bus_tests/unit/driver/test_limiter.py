@@ -115,6 +115,7 @@ def test_the_ramp_depends_on_the_time_and_not_on_how_it_was_cut(cuts_s: list[flo
         (Twist2D(0.0, 1.0), Twist2D(0.0, -1.0), 0.75),  # a turn brakes first: 1.0 / 4.0 + 1.0 / 2.0
         (Twist2D(0.5, 1.0), Twist2D(0.5, -1.0), 0.75),
         (Twist2D(0.1, 2.0), Twist2D(0.0, -2.0), 1.5),  # beside the brake too: 0.1 / 1.0 + 1.6 / 4.0 + 2.0 / 2.0
+        (Twist2D(0.1, 0.5), Twist2D(0.2, -0.3), 0.4),  # not beside an acceleration: 0.8 / 2.0
         (Twist2D.ZERO, Twist2D(0.1, 1.0), 0.5),  # the turn is the slower one: 1.0 / 2.0 against 0.1 / 0.5
         (Twist2D(0.1, 2.0), Twist2D.ZERO, 0.5),  # 2.0 / 4.0 against 0.1 / 1.0
     ],
@@ -168,6 +169,16 @@ def test_braking_does_not_wait_for_a_turn_that_grows() -> None:
     assert linear(states)[51] == 0.0  # 0.5 / 1.0 s, though the turn needs 2.0 / 2.0 s
     assert states[50].twist.angular_radps == pytest.approx(1.0, abs=0.03)
     assert states[-1].twist == Twist2D(0.0, 2.0)
+
+
+def test_a_turn_that_reverses_waits_for_no_braking_with_its_jerk_limit() -> None:
+    """A source that brakes by 2 mm/s each cycle: 1.0 rad/s are gone after 1.0 / 4.0 s, whatever the jerk limit does."""
+    state, turns = MotionState(Twist2D(0.5, 1.0)), []
+    for cycle in range(25):
+        state = LIMITER.step(state, Twist2D(0.498 - 0.002 * cycle, -2.0), DT_S)
+        turns.append(state.twist.angular_radps)
+    assert turns == pytest.approx([1.0 - 0.04 * (cycle + 1) for cycle in range(25)], abs=1e-12)
+    assert state.twist.linear_mps == pytest.approx(0.45, abs=0.003)
 
 
 def test_a_stop_follows_the_circle_that_the_base_is_on() -> None:

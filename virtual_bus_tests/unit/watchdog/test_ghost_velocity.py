@@ -40,7 +40,9 @@ def jitter(n: int) -> float:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(("velocity", "samples"), [(0.25, 7), (STILL * 1.01, 7), (STILL, 12), (2.0**-9, 12), (2.0**-11, 14)])
+@pytest.mark.parametrize(
+    ("velocity", "samples"), [(0.25, 7), (STILL * 1.01, 7), (STILL, 12), (2.0**-9, 12), (2.0**-11, 14)]
+)
 def test_a_frozen_encoder_is_found_after_a_tenth_of_a_second_or_of_a_millimetre(
     velocity: float, samples: int, sign: float
 ) -> None:
