@@ -66,7 +66,7 @@ def without_proof(robot: Robot) -> str:
 def kind_alone(robot: Robot) -> str:
     """Which drives another one of their kind could replace without a new proof, as a sentence; empty: none.
 
-    `identity` has no serial number of them, or 0, which makers write where they do not number their drives.
+    `identity` has no serial number of them, or 0, which manufacturers write where they do not number their drives.
     """
     joints = [drive.joint for drive in robot.drives if not drive.identity.serial]
     if robot.bus.is_virtual or _why_not_proven(robot) or not joints:

@@ -1,4 +1,4 @@
-"""Reads EDS and DCF files (CiA 306) as makers really write them: which objects a drive has. It decides nothing.
+"""Reads EDS and DCF files (CiA 306) as manufacturers really write them: which objects a drive has. It decides nothing.
 
 Whatever can be understood is taken; what is odd becomes a note with its line. An EDS is optional in canbase.
 """

@@ -110,7 +110,7 @@ def self_stop_sentence(eds: Eds) -> str:
         how = "it monitors heartbeats (1016h), but has no 6007h: whether the motor stops is unknown"
         return f"Do not count on it to stop by itself when the computer dies: {how}. Prove it with the wheels up."
     how = "it watches no heartbeat (no 1016h), no setpoints (no 1400h:5), and no guard (no 100Ch, or no 6007h)"
-    return f"It will NOT stop by itself when the computer dies: {how}. Look for a watchdog of its maker; wire STO."
+    return f"It will NOT stop by itself when the computer dies: {how}. Look for its manufacturer's watchdog; wire STO."
 
 
 def _identity(eds: Eds, out: _Lines) -> None:

@@ -53,7 +53,7 @@ class Battery(Section):
     full_v: Annotated[float, Field(ge=1.0, le=1000.0, description="a full battery at rest [V]")]
     empty_v: Annotated[float, Field(ge=1.0, le=1000.0, description="an empty battery at rest [V]")]
     design_capacity_ah: (
-        Annotated[float, Field(gt=0.0, le=10_000.0, description="by its maker [Ah]; none: unknown")] | None
+        Annotated[float, Field(gt=0.0, le=10_000.0, description="by its manufacturer [Ah]; none: unknown")] | None
     ) = None
 
     @model_validator(mode="after")

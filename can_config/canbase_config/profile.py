@@ -131,7 +131,7 @@ class Start(Section):
 
 
 class VendorWatchdog(Section):
-    """The maker's own time limit for commands. Without an object only the maker's tool can set it."""
+    """The manufacturer's own time limit for commands. Without an object only the manufacturer's tool can set it."""
 
     index: Index | None = None
     sub: Sub = 0
@@ -249,7 +249,7 @@ class Kind(Section):
 class Profile(Section):
     """One kind of motor drive."""
 
-    title: Annotated[str, Field(min_length=1, description="maker and type")]
+    title: Annotated[str, Field(min_length=1, description="manufacturer and type")]
     identity: Kind = Kind()
     layout: Layout = Layout()
     units: Units = Units()
@@ -274,7 +274,7 @@ class Profile(Section):
     measures: Measures = Measures()
     emcy: Annotated[
         dict[Annotated[int, Field(ge=0, le=0xFFFF)], Annotated[str, Field(min_length=1)]],
-        Field(description="the maker's emergency codes in words"),
+        Field(description="the manufacturer's emergency codes in words"),
     ] = Field(default_factory=dict)
     notes: Annotated[tuple[str, ...], Field(strict=False, description="notes for the first motion")] = ()
     unproven: Annotated[tuple[str, ...], Field(strict=False, description="keys above without a source; test them")] = ()

@@ -96,7 +96,7 @@ def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS 
         typer.secho(f"canbase: {error}", err=True, fg=typer.colors.RED, color=colour())
         raise typer.Exit(2) from error
     if why := why_no_drive(eds):
-        fail(f"{file}: {why}. A drive needs the EDS file of its maker for this very type", FAILED)
+        fail(f"{file}: {why}. A drive needs the EDS file of its manufacturer for this very type", FAILED)
     found = draft(eds)
     typer.echo(found.text, nl=False)
     lines = [f"{file}: {len(eds.objects)} objects, read as {eds.encoding}"]

@@ -25,8 +25,8 @@ def emcy(
 ) -> None:
     """Show the errors of a drive: the error register, the present code (603Fh), the history (1003h), in words.
 
-    Reading may run beside the driver. The maker's own codes come from the drive's profile. --clear asks first, and is
-    refused while a driver or another master is on the bus. It clears no fault: that is canbase reset.
+    It may read beside the driver. The manufacturer's codes are those of the drive's profile. --clear asks first, and
+    is refused while a driver or another master is on the bus. It clears no fault: that is canbase reset.
 
     Exit codes: 0 read or emptied, 1 no answer, refused, or the drive keeps no history, 2 wrong command line.
     """

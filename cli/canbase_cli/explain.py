@@ -28,7 +28,7 @@ EPILOG: Final = (
     "candump -L can0 > can0.log;  canbase explain can0.log"
 )
 EdsOption = Annotated[
-    list[Path] | None, typer.Option("--eds", metavar="FILE", help="A maker's EDS file: names of objects; repeatable.")
+    list[Path] | None, typer.Option("--eds", metavar="FILE", help="An EDS file, for the names of objects; repeatable.")
 ]
 ChannelOfFile = Annotated[
     str | None,

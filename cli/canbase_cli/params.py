@@ -37,7 +37,7 @@ class Group(str, Enum):
     APPLICATION = "application"
 
 
-NeededEdsOption = Annotated[Path, typer.Option("--eds", metavar="FILE", help="The maker's EDS file.", dir_okay=False)]
+NeededEdsOption = Annotated[Path, typer.Option("--eds", metavar="FILE", help="EDS file of the drive.", dir_okay=False)]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 WithoutStatuswordOption = Annotated[
     bool,
@@ -88,7 +88,7 @@ def diff(
     channel: ChannelOption = None,
     bitrate: BitrateOption = None,
     eds: Annotated[
-        Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file.", show_default="the file's own")
+        Path | None, typer.Option("--eds", metavar="FILE", help="EDS file of the drive.", show_default="the file's own")
     ] = None,
     timeout_s: SdoTimeoutOption = 0.5,
     everything: Annotated[bool, typer.Option("--all", help="Measurements, states and commands too.")] = False,
@@ -177,7 +177,7 @@ def defaults(
     yes: YesOption = False,
     without_statusword: WithoutStatuswordOption = False,
 ) -> None:
-    """Give the drive its maker's parameters back, with its next reset (1011h, "load").
+    """Give the drive its manufacturer's parameters back, with its next reset (1011h, "load").
 
     Save them first: canbase bus params save. Refused under the conditions of restore.
 

@@ -43,7 +43,7 @@ TypeOption = Annotated[
     str | None,
     typer.Option("--type", metavar="TYPE", help="u8 … i64, f32, str, hex.", show_default="from EDS or profile"),
 ]
-EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="The maker's EDS file: types, names.")]
+EdsOption = Annotated[Path | None, typer.Option("--eds", metavar="FILE", help="EDS file of the drive: types, names.")]
 IgnoreEdsOption = Annotated[
     bool, typer.Option("--ignore-eds", help="Even against access or range of --eds, where that file is wrong.")
 ]

@@ -93,10 +93,11 @@ class Caller:
         return bool(self._client(service).wait_for_service(within_s))
 
     def need_driver(self, service: str) -> None:
-        """Ends the command when no motor driver offers the service in time."""
+        """Ends the command when its node does not offer the service in time."""
         if not self.is_offered(service, self._wait_s):
             name = self._client(service).srv_name
-            fail(f"no motor driver offers {name}; is it running (canbase up), in this namespace?", NO_DRIVER)
+            node = service.partition("/")[0].replace("_", " ")
+            fail(f"no {node} offers {name}; is it running (canbase up), in this namespace?", NO_DRIVER)
 
     def call(self, service: str) -> str:
         """The sentence for an answer that reports success."""

@@ -85,7 +85,7 @@ def _by_unit(drive: Drive, factor: float) -> Scale:
     if found is None:
         raise CalibrationError(
             f"{drive.joint}: one bit of 606Ch is {factor:.3g} times {drive.actual_unit}, a unit that canbase does "
-            "not know: set the unit of velocities in the drive itself (60A9h, or the maker's tool)"
+            "not know: set the unit of velocities in the drive itself (60A9h, or the manufacturer's tool)"
         )
     why = f"velocity_unit: 606Ch gives {1.0 / factor:.3g} times the revolutions"
     return Scale(drive.gear_ratio, counts, found, why)

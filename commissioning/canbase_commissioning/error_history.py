@@ -15,7 +15,7 @@ from canbase_driver.cia301.sdo_client import NO_OBJECT, Read, SdoAborted, Write,
 ERROR_REGISTER, HISTORY, ERROR_CODE = 0x1001, 0x1003, 0x603F
 MOST_ENTRIES: Final = 254
 REGISTER_BITS: Final = (
-    "generic", "current", "voltage", "temperature", "communication", "device profile", "reserved", "of the maker",
+    "generic", "current", "voltage", "temperature", "communication", "device profile", "reserved", "manufacturer",
 )  # fmt: skip
 """Bits of 1001h, the lowest first (CiA 301)."""
 
@@ -33,7 +33,7 @@ class ErrorHistory:
     codes: Mapping[Address, int]
 
     def lines(self, makers: Mapping[int, str]) -> list[str]:
-        """For a person. `makers`: the maker's own codes in words."""
+        """For a person. `makers`: the manufacturer's own codes in words."""
         now = "unknown (1001h cannot be read)" if self.register is None else register_text(self.register)
         lines = [f"error register 1001h: {now}"]
         lines += [f"{at}: {_code(code, makers)}" for at, code in self.codes.items() if code]
@@ -93,6 +93,6 @@ def _code(code: int, makers: Mapping[int, str]) -> str:
 
 
 def _entry(entry: int, makers: Mapping[int, str]) -> str:
-    """Code in the lower half, the maker's information in the upper one (CiA 301, 1003h)."""
-    more = f", maker's field {entry >> 16:04X}h" if entry >> 16 else ""
+    """Code in the lower half, the manufacturer's information in the upper one (CiA 301, 1003h)."""
+    more = f", manufacturer's field {entry >> 16:04X}h" if entry >> 16 else ""
     return f"{_code(entry & 0xFFFF, makers)}{more}"

@@ -1,6 +1,6 @@
 """Objects as people write and read them: addresses, types, numbers, what some of them mean. CiA 301, CiA 402-2.
 
-Types come from the maker's EDS file, the drive's profile, or our own EDS of a CiA 402 drive, in this order.
+Types come from the manufacturer's EDS file, the drive's profile, or our own EDS of a CiA 402 drive, in this order.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def parse_address(text: str) -> Address:
 
 
 def known_object(at: Address, eds_files: Iterable[Eds], profile: Profile | None) -> Known:
-    """The entry of the first EDS file that has it, or of the profile. `eds_files`: the maker's first, then ours."""
+    """The entry of the first EDS file that has it, or of the profile. `eds_files`: the vendor's first, then ours."""
     by_profile = _of_profile(at, profile) if profile else None
     found = [entry for entry in (_of_eds(at, eds) for eds in eds_files) if entry is not None]
     name = found[0].name if found else ""
@@ -176,7 +176,7 @@ def meaning(at: Address, data: bytes) -> str:
     if index == 0x6041:
         return ", ".join(_state(word) for word in statuswords(data))
     if index in (0x6060, 0x6061):
-        return f"mode {_MODES.get(value, 'of the maker')}"
+        return f"mode {_MODES.get(value, 'of the manufacturer')}"
     if index == 0x603F:
         return emcy_text(value & 0xFFFF)
     if index == 0x1016 and at.sub:
@@ -212,6 +212,6 @@ ABORT_ADVICE: Final[Mapping[int, str]] = {
     0x0601_0000: "a PDO must be off (COB-ID bit 31) and its sub 0 be 0 before it is mapped",
     0x0609_0030: "the manual has the values that it takes",
     0x0800_0022: "not in this state: disable the drive, or NMT pre-operational first",
-    0x0800_0021: "another master has control: the maker's tool, or local mode",
+    0x0800_0021: "another master has control: the manufacturer's tool, or local mode",
 }
 """What to try, by SDO abort code."""

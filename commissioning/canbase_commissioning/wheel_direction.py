@@ -60,7 +60,7 @@ def find_direction(rig: PoweredDrives, drive: Drive, again: str = "") -> Script[
     if moved_m < -LEAST_SHARE * FIRST_MPS * FIRST_S:
         raise CommissionError(
             f"{joint}: the encoder (6064h) counts against the velocity that was ordered: exchange two phases of the "
-            "motor or two tracks of the encoder, or set its polarity with the maker's tool; do not drive it like this"
+            "motor or two tracks of the encoder, or set its polarity with the manufacturer's tool; do not drive it so"
         )
     text = f"Which way did {joint} turn: forward, backward, nothing, other (another wheel turned)?"
     seen: Seen = yield Ask(f"direction.{joint}{again}", text, one_of(Seen))

@@ -86,11 +86,11 @@ def _open(drive: Drive, key: str) -> bool:
 
 
 def _by_vendor(drive: Drive, stops: StopsItself, why: str) -> tuple[StopsItself, str]:
-    """The maker's own time limit, if there is one that the boot sets."""
+    """The manufacturer's own time limit, if there is one that the boot sets."""
     own: SelfStop = drive.kind.self_stop
     if own.vendor_watchdog is None:
         return stops, why
     if own.vendor_watchdog.index is None:
-        return stops, f"{why}; {own.vendor_watchdog.text} (only the maker's tool sets it)"
+        return stops, f"{why}; {own.vendor_watchdog.text} (only the manufacturer's tool sets it)"
     proven = not drive.kind.is_unproven("self_stop.vendor_watchdog")
     return (StopsItself.YES if proven else StopsItself.UNPROVEN), f"{own.vendor_watchdog.text}, set by the boot"

@@ -66,7 +66,7 @@ ADVICE: Final[dict[Cause, str]] = {
     Cause.DEACTIVATED: "a lifecycle manager or a person deactivated motor_driver",
     Cause.RECORDER_PAUSED: "look for what held the computer: load, suspend, a debugger, swapping",
     Cause.ADAPTER_FAILED: "check the CAN adapter, its plug and the interface: ip -details link show can0",
-    Cause.SECOND_MASTER: "find the other master: a second driver, a maker's tool, a PLC; a bus has one master",
+    Cause.SECOND_MASTER: "find the other master: a second driver, a manufacturer's tool, a PLC; a bus has one master",
     Cause.NMT_COMMAND: "find out which master sent it, and why",
     Cause.TWIN_NODE: "give each node its own id (switches, or LSS)",
     Cause.NODE_RESTARTED: "check the supply and the plug of this node: it started again",

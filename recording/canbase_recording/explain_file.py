@@ -44,7 +44,7 @@ def explain_file(
 
 
 def known_objects(eds_files: Sequence[Path]) -> list[Eds]:
-    """The maker's EDS files, then canbase's own of a CiA 402 drive. Raises EdsError."""
+    """The manufacturer's EDS files, then canbase's own of a CiA 402 drive. Raises EdsError."""
     ours = Path(str(files("canbase_config"))) / "eds" / "canbase_cia402.eds"
     return [read_eds(path) for path in (*eds_files, ours)]
 

@@ -88,7 +88,7 @@ class Decoder:
     """Knows the robot and the EDS files where they are given, and learns PDO mappings through `layouts`."""
 
     def __init__(self, layouts: PdoLayouts, robot: Robot | None = None, eds_files: Sequence[Eds] = ()) -> None:
-        """`eds_files`: those of makers first, then canbase's own."""
+        """`eds_files`: those of manufacturers first, then canbase's own."""
         self._layouts = layouts
         self._eds_files = tuple(eds_files)
         drives = robot.drives if robot else ()
@@ -134,7 +134,7 @@ class Decoder:
         return f"node {node_id}{extra}" + (f" ({', '.join(joints)})" if joints else "")
 
     def emergency(self, node_id: int, code: int) -> str:
-        """An EMCY code with its meaning, in the maker's words where the profile has them."""
+        """An EMCY code with its meaning, in the manufacturer's words where the profile has them."""
         profile = self._profiles.get(node_id)
         text = emcy_text(code, profile.emcy) if profile else emcy_text(code)
         return f"{code:04X}h {text}"

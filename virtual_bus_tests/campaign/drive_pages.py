@@ -37,7 +37,7 @@ OWN_NAMES = {
     0x604A: "vl velocity quick stop",
     0x604C: "vl dimension factor",
 }
-"""Objects of makers and of mode 2, which our EDS does not have."""
+"""Objects of manufacturers and of mode 2, which our EDS does not have."""
 MEANINGS: dict[int, dict[int, str]] = {
     0x6007: {0: "nothing", 1: "fault", 2: "disable voltage", 3: "quick stop"},
     0x605A: {2: "stop by the quick stop ramp, then without power"},

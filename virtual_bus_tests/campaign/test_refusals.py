@@ -7,7 +7,7 @@ import re
 from campaign.refusals import CLASSES, PAGE, REFUSALS, WRONG_STATE, outcome, page
 from canbase_campaign.advice import read_advice
 
-STEPS = re.compile(r"maker's tool|switch the drive off and on|check `axis`|`mode`|the manual of the drive")
+STEPS = re.compile(r"manufacturer's tool|switch the drive off and on|check `axis`|`mode`|the manual of the drive")
 
 
 def test_the_page_is_up_to_date() -> None:

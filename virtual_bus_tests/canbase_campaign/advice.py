@@ -1,4 +1,4 @@
-"""What a message of the driver tells a person to do, as a person reads it: keys, objects, nodes, the maker's tool."""
+"""What a message of the driver tells a person to do, as a person reads it: keys, objects, nodes, tools."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _KEY = re.compile(r"\b[a-z_]+(?:\.[a-z_0-9]+)+\b")
 _MODE = re.compile(r"`mode`")
 OF_A_DRIVE = ("mode", "velocity_unit", "counts_per_motor_rev")
 """Keys of robot.yaml below `drives` that a message may name."""
-MAKERS_TOOL, UNUSABLE = "maker's tool", "cannot be used"
+MAKERS_TOOL, UNUSABLE = "manufacturer's tool", "cannot be used"
 WITHOUT_OBJECT = ("boot-up message", "SDO requests", "SDO transfers", "NMT reset")
 """What a message may be about that has no object."""
 
@@ -40,7 +40,7 @@ class Advice:
 
     @property
     def by_tool(self) -> bool:
-        """An object is to be set with the maker's tool."""
+        """An object is to be set with the manufacturer's tool."""
         return MAKERS_TOOL in self.text
 
     @property

@@ -239,6 +239,6 @@ def _cure(advice: Advice, setup: Setup, drives: dict[int, OddDrive]) -> list[str
                 done.append(f"node {node_id}: {key}: {value}")
         if advice.by_tool and not done:
             set_right = [each for each in odd.drawn if each.tool & set(advice.objects)]
-            done += [f"node {node_id}: the maker's tool cures {each.name}" for each in set_right]
+            done += [f"node {node_id}: the manufacturer's tool cures {each.name}" for each in set_right]
             drives[node_id] = odd.without(set_right)
     return done

@@ -139,7 +139,7 @@ class Reach:
         return longest_s
 
     def _is_lost(self, node_id: int, now_s: float) -> bool:
-        """No process reaches it, and it does not stop by itself, or not yet: a maker's watchdog has its own time."""
+        """No process reaches it, and it does not stop by itself, or not yet: a vendor's watchdog has its own time."""
         if self._reacts(node_id):
             since = self._reacts_since.setdefault(node_id, now_s)
             if not self._watchdog_reaches(node_id):

@@ -1,4 +1,4 @@
-"""The maker's own watchdog of some drives, beside CiA 301: motors that get no commands for too long stop."""
+"""The manufacturer's own watchdog of some drives, beside CiA 301: motors that get no commands for too long stop."""
 
 from __future__ import annotations
 

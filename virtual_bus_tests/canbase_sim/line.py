@@ -9,7 +9,7 @@ from canbase_sim.frame import Frame
 ALIAS = 1 << 11
 """Lowest bit of a 29-bit identifier that an eleven-bit one does not have."""
 SHORT_EMCY = 3
-"""Bytes of an emergency message from a drive that leaves the maker's out: code and 1001h."""
+"""Bytes of an emergency message from a drive that leaves the manufacturer's out: code and 1001h."""
 
 
 class Line:

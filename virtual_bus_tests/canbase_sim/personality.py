@@ -34,7 +34,7 @@ class Personality:
     missing_subs: frozenset[int] = frozenset()
     """Single entries (`index << 8 | sub-index`) that it does not have."""
     extras: Mapping[int, Extra] = field(default_factory=dict)
-    """Objects of the maker, by `index << 8 | sub-index`."""
+    """Objects of the manufacturer, by `index << 8 | sub-index`."""
     voltage: Mapping[int, float] = field(default_factory=lambda: {_key(0x6079): 0.001})
     """Entries that show the supply, and the volts of one bit; CiA 402-2: 6079h in mV. Read by SDO alone."""
     defaults: Mapping[int, int] = field(default_factory=dict)
@@ -77,7 +77,7 @@ class Personality:
     heartbeat_fault_needs_communication_reset: bool = False
     """Fault resets are in vain after 8130h until NMT reset communication or node."""
     command_timeout_s: float | None = None
-    """The maker's own watchdog: without a command for this long the motors stop; the next one starts them again [s]."""
+    """The vendor's own watchdog: without a command for this long the motors stop; the next one starts them [s]."""
     command_timeout_object: int | None = None
     """The entry that sets it in ms (0: off), where the bus can."""
 
@@ -160,7 +160,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         target_unit="rpm",
         actual_unit="rpm",
         acceleration_unit="0.1rpm/s",
-        starts_operational=True,  # manual of the battery system of the same maker
+        starts_operational=True,  # manual of the battery system of the same manufacturer
         command_timeout_s=1.0,  # RWD; then the earlier speed comes back with the next command
     ),
     "zlac8015d": Personality(
@@ -195,7 +195,7 @@ PERSONALITIES: Mapping[str, Personality] = {
         missing_subs=_RPDO_TIMERS,  # DCF
         defaults={_key(0x6007): 1, _key(0x1029, 1): 1, _key(0x605A): 2, _key(0x605E): 2},  # DCF
         extras={_key(0x22A2): Extra("H", 38)},  # DCF
-        target_unit="counts/s",  # default of the maker's tool
+        target_unit="counts/s",  # default of the manufacturer's tool
         actual_unit="counts/s",
         acceleration_unit="counts/s2",
     ),

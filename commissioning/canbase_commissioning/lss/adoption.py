@@ -26,9 +26,7 @@ RESTART_S: Final = 3.0
 """After NMT reset communication every drive answers by then [s]."""
 QUIET_S: Final = 0.5
 """No drive has answered for the first time for so long: all of them are there [s]."""
-NO_LSS: Final = (
-    "no drive answers LSS. Set node ids and bit rate by their switches or their maker's tool, one drive at a time"
-)
+NO_LSS: Final = "no drive answers LSS. Set node ids and bit rate by switches or the manufacturer's tool, drive by drive"
 
 
 def look(bitrate: int, *, one_drive_each: bool = False) -> Talk[Census]:
@@ -60,7 +58,7 @@ def discover(census: Census, bitrate: int) -> Talk[list[Identity]]:
     if remaining:
         raise ConversationError(
             f"node {', '.join(map(str, remaining))} answers SDO and takes no LSS: disconnect it, and set it by its "
-            f"switches or its maker's tool. Found: {', '.join(map(str, found)) or 'none'}"
+            f"switches or its manufacturer's tool. Found: {', '.join(map(str, found)) or 'none'}"
         )
     if not found:
         raise ConversationError(NO_LSS)

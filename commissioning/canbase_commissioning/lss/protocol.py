@@ -120,5 +120,5 @@ def refusal(answer: Frame) -> str:
     command, code, detail = answer.data[:3]
     if code == 0:
         return ""
-    of_maker = f"its maker's error {detail}" if code == UNCONFIGURED else f"error {code}"
+    of_maker = f"its manufacturer's error {detail}" if code == UNCONFIGURED else f"error {code}"
     return _REFUSALS.get((command, code), of_maker)

@@ -31,7 +31,7 @@ def run_emcy(bus: Bus, robot: Robot | None, node: int, timeout_s: float) -> None
 
 
 def _makers(line: BusSession, heard: Listener, robot: Robot | None, node: int, timeout_s: float) -> Mapping[int, str]:
-    """The maker's codes in words: of the profile in robot.yaml, or of the one that knows the drive."""
+    """The manufacturer's codes in words: of the profile in robot.yaml, or of the one that knows the drive."""
     for drive in robot.drives if robot else ():
         if drive.node_id == node:
             return drive.kind.emcy

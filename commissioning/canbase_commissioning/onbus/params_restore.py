@@ -139,8 +139,8 @@ def run_order(
     texts = {
         Order.STORE: (f"Node {node} keeps its present parameters ({group}) over a power cycle, in place of those that "
                       "it has stored. Go on?", "stored"),
-        Order.DEFAULTS: (f"Node {node} gets its maker's parameters ({group}) with its next reset: units, limits and "
-                         "its node id may be others then. Go on?", "the defaults come with its next reset: "
+        Order.DEFAULTS: (f"Node {node} gets its manufacturer's parameters ({group}) with its next reset: units, "
+                         "limits and its node id may be others then. Go on?", "the defaults come with its next reset: "
                          f"canbase bus nmt {node} reset, or a power cycle"),
     }  # fmt: skip
     question, told = texts[what]

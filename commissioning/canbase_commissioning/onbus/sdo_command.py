@@ -45,7 +45,7 @@ SLOW_BITRATE: Final = 125_000
 class Target:
     """One object of one node, and what is known about it. `kind`: of objects.TYPES; empty: unknown.
 
-    `entry`: what the maker's EDS has about it; None: nothing, or no EDS was given.
+    `entry`: what the manufacturer's EDS has about it; None: nothing, or no EDS was given.
     """
 
     node: int
@@ -73,7 +73,7 @@ class Target:
 
     @property
     def by_eds(self) -> str:
-        """Access and range of the maker's EDS, in brackets; empty: unknown."""
+        """Access and range of the manufacturer's EDS, in brackets; empty: unknown."""
         words = [] if self.entry is None else [word for word in (self.entry.access, limits(self.entry)) if word]
         return f" [{', '.join(words)}]" if words else ""
 

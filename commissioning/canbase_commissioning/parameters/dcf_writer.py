@@ -1,6 +1,6 @@
-"""Writes a DCF (CiA 306): the maker's EDS as it is, and in it the values of one drive.
+"""Writes a DCF (CiA 306): the manufacturer's EDS as it is, and in it the values of one drive.
 
-Line by line, so that nothing is lost of what the maker wrote, odd as it may be; why: docs/decisions/0101.
+Line by line, so that nothing is lost of what the manufacturer wrote, odd as it may be; why: docs/decisions/0101.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""1010h and 1011h: the drive keeps its present parameters over a power cycle, or gets its maker's back. CiA 301."""
+"""1010h and 1011h: the drive keeps its present parameters over a power cycle, or gets its defaults back. CiA 301."""
 
 from __future__ import annotations
 

@@ -63,13 +63,13 @@ OTHER_STATE = (
     "and on again, and let no other master control it"
 )
 NOT_AN_AXIS = (
-    "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the maker's tool that the drive is set "
-    "to CiA 402 and takes its commands from the bus"
+    "Every axis of a CiA 402 drive has it: check `axis` in robot.yaml, and with the manufacturer's tool that the drive "
+    "is set to CiA 402 and takes its commands from the bus"
 )
 UNANSWERED = (
     "It answered before, so its node id and the bit rate are right, and the boot is tried again each second. If this "
     "goes on, check its supply and its cable, and let no other program use its SDO channel (canbase bus "
-    "sdo, the maker's "
+    "sdo, the manufacturer's "
     "tool)"
 )
 ELSE_UNUSABLE = "where that cannot be done, the drive cannot be used"
@@ -143,7 +143,7 @@ def hint(error: SdoError) -> str:
     if index == 0x60FF:
         return (
             "canbase sets it to 0 before there is power: let the drive take its commands from the bus, with the "
-            f"maker's tool; {ELSE_UNUSABLE}"
+            f"manufacturer's tool; {ELSE_UNUSABLE}"
         )
     needed = "canbase needs this object: look it up in the manual of the drive"
     return needed + (f", and see `{key}` of its drive profile" if key else "")
@@ -161,7 +161,7 @@ def _spared(index: int, sub: int) -> str:
 
 
 def in_digits(step: Write) -> str:
-    """ "6007h:0 to 0003h": the object and its value, as maker's tools and canbase bus sdo show it."""
+    """ "6007h:0 to 0003h": the object and its value, as manufacturer's tools and canbase bus sdo show it."""
     return f"{step} to {int.from_bytes(step.data, 'little'):0{2 * len(step.data)}X}h"
 
 
@@ -170,11 +170,11 @@ def without(step: Write, *, lacks_it: bool = False) -> str:
     it."""
     index = _first_axis(step.index)
     if beside := BESIDES.get((index, step.sub), ""):
-        return f"; so {beside}" + (f": set {in_digits(step)} with the maker's tool" if not lacks_it else "")
+        return f"; so {beside}" + (f": set {in_digits(step)} with the manufacturer's tool" if not lacks_it else "")
     meaning = WITHOUT.get((index, step.sub)) if step.value else None
     if not meaning:
         return ""
-    by_hand = f"set {in_digits(step)} with the maker's tool"
+    by_hand = f"set {in_digits(step)} with the manufacturer's tool"
     cure = "canbase setup commission shows whether it stops in another way" if lacks_it else by_hand
     if index in FOR_SELF_STOP:
         return f"; so {meaning}: {cure}, else only a wired STO does"

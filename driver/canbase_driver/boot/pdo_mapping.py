@@ -209,9 +209,8 @@ def _make_right(node: NodeAccess, layout: NodeLayout, pdo: Pdo, old: int, cob_id
         why = refused.text if isinstance(refused, SdoAborted) else refused.problem
         off = f"{pdo.communication:04X}h:1: {stays_on.text}"
         problem = f"{pdo.name} cannot be switched off ({off}), nor mapped while it is on ({why})"
-        tool = (
-            f"Let {pdo.name} carry {_needed(pdo)} with COB-ID {pdo.cob_id:03X}h, by the maker's tool; {ELSE_UNUSABLE}"
-        )
+        carries = f"Let {pdo.name} carry {_needed(pdo)} with COB-ID {pdo.cob_id:03X}h"
+        tool = f"{carries}, by the manufacturer's tool; {ELSE_UNUSABLE}"
         raise BootError.refused(node.node_id, problem, stays_on.code, tool) from refused
     try:
         yield from _set_type(node, pdo, unread=mapped is not None and pdo.transmission_type != AT_ONCE)
@@ -271,7 +270,7 @@ def _set_by_event(node: NodeAccess, layout: NodeLayout, pdo: Pdo, refused: BootE
             raise BootError(
                 node.node_id,
                 f"{refused.problem}, nor {time}",
-                f"Without SYNC it must come every {own.event_timer_ms} ms: set this with the maker's tool; "
+                f"Without SYNC it must come every {own.event_timer_ms} ms: set this with the manufacturer's tool; "
                 f"{ELSE_UNUSABLE}",
             )
     how = f"it is sent every {own.event_timer_ms} ms by its timer" if pdo.is_received else "it acts when it arrives"
@@ -284,7 +283,7 @@ def _types(pdo: Pdo) -> tuple[int, ...]:
 
 def _about_type(node: NodeAccess, pdo: Pdo, type_now: int | None) -> Steps[str]:
     """What cures it. The key of the profile, only where the drive takes the type that this key leads to."""
-    tool = f"Set {pdo.communication:04X}h:{TYPE} to {pdo.transmission_type} with the maker's tool"
+    tool = f"Set {pdo.communication:04X}h:{TYPE} to {pdo.transmission_type} with the manufacturer's tool"
     if pdo.transmission_type == AT_ONCE and pdo.event_timer_ms is None:
         return f"{tool}: the watchdog's quick stop cannot wait for a SYNC; {ELSE_UNUSABLE}"
     if pdo.transmission_type == AT_ONCE and (
@@ -330,7 +329,7 @@ def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
     yield from _write_count(node, pdo, len(pdo.mapping))
     if not (yield from (_holds(pdo) if pdo.is_received else _is_mapped(pdo))):
         problem = f"{pdo.name} reads back another mapping than was written to {pdo.mapping_object:04X}h"
-        tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool; {ELSE_UNUSABLE}"
+        tool = f"Let {pdo.name} carry {_needed(pdo)} with the manufacturer's tool; {ELSE_UNUSABLE}"
         raise BootError(node.node_id, problem, tool)
 
 
@@ -345,7 +344,7 @@ def _write_count(node: NodeAccess, pdo: Pdo, count: int) -> Steps[None]:
 def _unmapped(node: NodeAccess, pdo: Pdo, sub: int, what: str, refused: SdoAborted) -> BootError:
     """The drive does not take `what` into this PDO."""
     problem = f"{pdo.name} does not take {what} ({pdo.mapping_object:04X}h:{sub}: {refused.text})"
-    tool = f"Let {pdo.name} carry {_needed(pdo)} with the maker's tool; {ELSE_UNUSABLE}"
+    tool = f"Let {pdo.name} carry {_needed(pdo)} with the manufacturer's tool; {ELSE_UNUSABLE}"
     return BootError.refused(node.node_id, problem, refused.code, tool)
 
 

@@ -74,8 +74,8 @@ def _unit_cure(drive: Drive, misfit: Misfit, offset: int) -> str:
     entry = f"{{index: 0x{misfit.index + offset:04X}, sub: {misfit.sub}, value: {misfit.value}}}"
     fits = f"set `{misfit.key}: {misfit.fits}`" if misfit.fits else f"no {misfit.key} means this"
     return (
-        f"In robot.yaml, {fits} for {drive.joint}, or set {misfit.index + offset:04X}h with the maker's tool to what "
-        f"robot.yaml has. Where its wheel was measured and robot.yaml is right, add {entry} to its `expects`"
+        f"In robot.yaml, {fits} for {drive.joint}, or set {misfit.index + offset:04X}h with the manufacturer's tool to "
+        f"what robot.yaml has. Where its wheel was measured and robot.yaml is right, add {entry} to its `expects`"
     )
 
 
@@ -87,7 +87,7 @@ def _name(index: int) -> str:
 def _cure(drive: Drive, expected: Expected) -> str:
     return (
         "The drive has lost or changed its settings, and would turn its wheel otherwise than ordered: set them again "
-        f"(canbase bus params restore, or the maker's tool). If the change is meant, take {expected.index:04X}h:"
+        f"(canbase bus params restore, or the manufacturer's tool). If the change is meant, take {expected.index:04X}h:"
         f"{expected.sub} out of `expects` of {drive.joint} in robot.yaml, and then, with the wheels up: "
         "canbase setup commission --steps directions,scale"
     )

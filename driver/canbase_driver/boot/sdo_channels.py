@@ -53,8 +53,8 @@ def _requests(node: NodeAccess, index: int) -> Steps[int | None]:
         if may_exist and (yield from node.tries(Write(index, REQUESTS, CLOSED, 4))):
             return CLOSED
         tool = (
-            "where it has a second SDO channel, close it with the maker's tool and store that (1010h): nobody sees "
-            "what comes by it"
+            "where it has a second SDO channel, close it with the manufacturer's tool and store that (1010h): nobody "
+            "sees what comes by it"
         )
         node.notes.append(f"{index:04X}h:{REQUESTS} cannot be read: {refused.text}{see(index, REQUESTS)}; {tool}")
         return None
@@ -85,8 +85,8 @@ def _stays_open(node: NodeAccess, index: int, requests: int, refusals: list[SdoA
     channel = f"a second SDO channel takes requests by {requests & _IDENTIFIER:03X}h"
     problem = f"{index:04X}h:{REQUESTS} stays at {requests:08X}h{why}: {channel}, where nobody sees what they change"
     tool = (
-        f"Close it with the maker's tool (bit 31 of {index:04X}h:{REQUESTS}) and store that (1010h), because the boot "
-        f"resets the drive; {ELSE_UNUSABLE}"
+        f"Close it with the manufacturer's tool (bit 31 of {index:04X}h:{REQUESTS}) and store that (1010h): the "
+        f"boot resets the drive; {ELSE_UNUSABLE}"
     )
     codes = [refused.code for refused in refusals]
     return BootError.refused(node.node_id, problem, DEVICE_STATE if DEVICE_STATE in codes else 0, tool)

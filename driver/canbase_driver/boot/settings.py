@@ -164,14 +164,15 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
             value = AxisUnits(drive, robot.base).acceleration_raw(needed)
             least = f"{needed:g} m/s² (limits.{key}), a value of {value}{kept.what}"
             node.notes.append(
-                f"how hard {drive.joint} brakes is unknown: it must be at least {least}; set it with the maker's tool"
+                f"how hard {drive.joint} brakes is unknown: it must be at least {least}; "
+                "set it with the manufacturer's tool"
             )
             continue
         if has >= KEPT_SHARE * needed:
             continue
         problem = f"{kept.what}: {drive.joint} brakes with {has:.3g} m/s² by it"
         slower = f"set `limits.{key}: {math.floor(1000.0 * has) / 1000.0:g}` in robot.yaml, where it is {needed:g}"
-        hint = f"Set the object with the maker's tool, or {slower}"
+        hint = f"Set the object with the manufacturer's tool, or {slower}"
         raise BootError(node.node_id, problem, hint)
 
 
@@ -203,7 +204,9 @@ def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
     if option != COASTS:
         return
     problem = f"{at.index:04X}h:{at.sub} stays at 0: a quick stop lets {drive.joint} coast"
-    hint = "Set it to 2 with the maker's tool; where rolling out is right, options.quick_stop: no in its drive profile"
+    hint = (
+        "Set it to 2 with the manufacturer's tool; to let it roll out, set options.quick_stop: no in its drive profile"
+    )
     raise BootError(node.node_id, problem, hint)
 
 
@@ -236,7 +239,7 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
             if refused.code not in VALUE_REFUSED:
                 node.notes.append(
                     f"1017h:0: {refused.text}; so its heartbeat must come by itself, within {longest} ms: set that "
-                    f"with the maker's tool; {GUARDING_ALONE}"
+                    f"with the manufacturer's tool; {GUARDING_ALONE}"
                 )
                 return
         except BootError as other:
@@ -258,7 +261,7 @@ def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[
         if period_ms > longest_ms and (yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))):
             key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * period_ms / 1000:g}`"
             raise BootError(node.node_id, problem, f"It takes {period_ms} ms: set {key} in robot.yaml")
-    tool = f"set 1017h:0 to 1 to {longest_ms} with the maker's tool"
+    tool = f"set 1017h:0 to 1 to {longest_ms} with the manufacturer's tool"
     none = (
         f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {tool}, or, {GUARDING_ALONE}; without either it cannot be used"
     )
@@ -337,7 +340,7 @@ def _could_watch(node: NodeAccess, drive: Drive) -> Steps[bool]:
 
 
 def _set_vendor_watchdog(node: NodeAccess, kind: Profile, robot: Robot) -> Steps[str]:
-    """The maker's own command timeout; what is not proven to stop the motor is only noted."""
+    """The manufacturer's own command timeout; what is not proven to stop the motor is only noted."""
     watchdog, timeout_s = kind.self_stop.vendor_watchdog, robot.timeouts.drive_heartbeat_s
     if watchdog is None:
         return ""

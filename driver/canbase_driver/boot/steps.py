@@ -151,7 +151,7 @@ class NodeAccess:
         if actual is not None and not _same(actual, step.data):
             problem = f"{step} is {_hex(actual)}, expected {_hex(step.data)}{refusal}"
             other = "find what else sets it: another master, an input, a program in the drive"
-            raise BootError(self.node_id, problem, f"Set {in_digits(step)} with the maker's tool, or {other}")
+            raise BootError(self.node_id, problem, f"Set {in_digits(step)} with the manufacturer's tool, or {other}")
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:

@@ -49,14 +49,14 @@ def configure_vl(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
             problem = (
                 f"{least} stays at {kept}: {drive.joint} turns at {_mps(units, kept):.3g} m/s where less is ordered"
             )
-            raise BootError(node.node_id, problem, "Set it to 0 with the maker's tool")
+            raise BootError(node.node_id, problem, "Set it to 0 with the manufacturer's tool")
     needed = abs(units.velocity_raw(max_wheel_mps(robot)))
     kept = yield from node.read_if_present(least.index, MAX)
     if kept is None or kept >= needed or (yield from node.set_if_present(Write(least.index, MAX, needed, 4))):
         return
     problem = f"{least.index:04X}h:{MAX} stays at {kept}: {drive.joint} turns at {_mps(units, kept):.3g} m/s at most"
     slower = f"lower limits.linear_mps and limits.angular_radps: they need {max_wheel_mps(robot):.3g} m/s"
-    raise BootError(node.node_id, problem, f"Set it to {needed} with the maker's tool, or {slower}")
+    raise BootError(node.node_id, problem, f"Set it to {needed} with the manufacturer's tool, or {slower}")
 
 
 def set_vl_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: float) -> Steps[KeptRamp | None]:
@@ -92,7 +92,9 @@ def _set_unit(node: NodeAccess, drive: Drive) -> Steps[None]:
         kept = yield from node.read_if_present(index, sub)
         if kept not in (None, 1):
             problem = f"{index:04X}h:{sub} stays at {kept}: one bit of 6042h is not 1 rpm"
-            cure = "Set 604Ch to 1/1 with the maker's tool, or `units.target_velocity` and `units.actual_velocity`"
+            cure = (
+                "Set 604Ch to 1/1 with the manufacturer's tool, or `units.target_velocity` and `units.actual_velocity`"
+            )
             raise BootError(node.node_id, problem, f"{cure} of its drive profile to what it is")
 
 

@@ -65,7 +65,7 @@ TEXTS = {
 
 @dataclass(frozen=True, slots=True)
 class Emcy:
-    """An emergency message: `code` as in `TEXTS`, `register` as 1001h, `vendor` what the maker adds (0…5 bytes)."""
+    """An emergency message: `code` as in `TEXTS`, `register` as 1001h, `vendor` what the vendor adds (0…5 bytes)."""
 
     node_id: int
     code: int
@@ -83,7 +83,7 @@ class Emcy:
         return self.text_with({})
 
     def text_with(self, makers: Mapping[int, str]) -> str:
-        """The same, with the maker's own words for its codes, and its bytes where there are any."""
+        """The same, with the manufacturer's own words for its codes, and its bytes where there are any."""
         details = f", bytes {self.vendor.hex(' ').upper()}" if any(self.vendor) else ""
         return f"{self.code:04X}h {emcy_text(self.code, makers)}{details}"
 
@@ -101,7 +101,7 @@ def parse_emcy(frame: Frame) -> Emcy | None:
 
 
 def emcy_text(code: int, makers: Mapping[int, str] = MappingProxyType({})) -> str:
-    """Meaning of an error code 0…FFFFh in words: the maker's own, or the most specific row of the table."""
+    """Meaning of an error code 0…FFFFh in words: the manufacturer's own, or the most specific row of the table."""
     if code in makers:
         return makers[code]
     digits = f"{code:04X}"

@@ -28,7 +28,7 @@ from canbase_driver.cia301.nmt import RPDO, TPDO
 EVERY_SYNC = 1
 """Transmission type: a TPDO goes out after each SYNC, an RPDO takes effect at the next one (CiA 301)."""
 AT_ONCE, AT_ONCE_TOO = 255, 254
-"""Transmission types: event driven, an RPDO takes effect when it arrives (CiA 301, profile's and maker's event)."""
+"""Transmission types: event driven, an RPDO takes effect when it arrives (CiA 301, profile's and vendor's event)."""
 QUICK_STOP_RPDO = 4
 """The watchdog's PDO has this number, or the last one of a drive with fewer."""
 

@@ -68,7 +68,7 @@ class SignsOfLife:
         return (
             f"{sent}, but it answers no request of the boot: let no other program use its SDO channel "
             f"(canbase bus sdo, "
-            "the maker's tool); then switch the drive off and on again"
+            "the manufacturer's tool); then switch the drive off and on again"
         )
 
     def may_be_starting(self, now_s: float) -> str:

@@ -67,7 +67,8 @@ class DriverServices:
 
     def _on_reset(self, asked: Asked) -> None:
         def end(outcome: RequestOutcome) -> None:
-            self._event_log.write(f"reset: {outcome.sentence}", Priority.NOTICE)
+            text = outcome.sentence if outcome.done else f"reset: {outcome.sentence}"
+            self._event_log.write(text, Priority.NOTICE)
             self._answer(asked, outcome)
 
         self._loop.reset(end)

@@ -104,7 +104,7 @@ class Axis:
     state: State = State.NOT_READY_TO_SWITCH_ON
     faults: AxisFaults = field(default_factory=AxisFaults)
     ramp_up_mps2: float = AT_ONCE
-    """Its own ramp away from zero, where that is slower than 6083h: soft starts of the maker [m/s²]."""
+    """Its own ramp away from zero, where that is slower than 6083h: soft starts of the manufacturer [m/s²]."""
     uncoupled: bool = False
     """Its motor turns, and its wheel rolls without it."""
     causes: set[int] = field(default_factory=set)
@@ -203,7 +203,7 @@ class Axis:
             self._command(Command.DISABLE_VOLTAGE)
 
     def starve(self) -> None:
-        """The maker's own watchdog: the motor stops, nothing else changes, and the next target moves it again."""
+        """The vendor's own watchdog: the motor stops, nothing else changes, and the next target moves it again."""
         if self.state is _ENABLED and not self.faults.frozen:
             self._stop(1, _stay)
 

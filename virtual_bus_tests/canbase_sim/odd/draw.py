@@ -32,7 +32,7 @@ class OddDrive:
         return manner
 
     def without(self, gone: Iterable[Drawn]) -> OddDrive:
-        """After the maker's tool has set something right."""
+        """After the manufacturer's tool has set something right."""
         gone = tuple(gone)
         return replace(self, drawn=tuple(each for each in self.drawn if each not in gone))
 

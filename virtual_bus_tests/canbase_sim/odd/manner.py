@@ -57,6 +57,6 @@ class Manner:
     velocity_noise: int = 0
     """606Ch is up to so many bits beside the speed."""
     emcy_every_s: float = 0.0
-    """An emergency message of the maker's, followed by "no error", so often [s]; 0: none."""
+    """An emergency message of the manufacturer's, followed by "no error", so often [s]; 0: none."""
     start_count: int | None = None
     """6064h after power on."""

@@ -18,7 +18,7 @@ from canbase_sim.odd.odd_sdo import OddSdoService
 from canbase_sim.plant.battery import REST_V
 
 MAKERS_CODE, NO_ERROR = 0xFF01, 0x0000
-"""Emergency codes: FFxxh is the maker's (CiA 301)."""
+"""Emergency codes: FFxxh is the manufacturer's (CiA 301)."""
 EMCY_S = 0.05
 """From one to the "no error" after it [s]."""
 

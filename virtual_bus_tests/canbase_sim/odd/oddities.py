@@ -297,7 +297,7 @@ def _noisy_velocity(random: Random) -> Drawn:
 
 def _emergencies(random: Random) -> Drawn:
     every_s = round(random.uniform(0.1, 2.0), 2)
-    return Drawn(f"an emergency message of the maker's each {every_s} s", with_manner(emcy_every_s=every_s))
+    return Drawn(f"an emergency message of the manufacturer's each {every_s} s", with_manner(emcy_every_s=every_s))
 
 
 def _count_wraps(random: Random) -> Drawn:
@@ -377,9 +377,9 @@ ODDITIES: Mapping[str, Oddity] = {
     "coasts": Oddity("CiA 402-2, 605Ah: 0", "a quick stop coasts", _coasts),
     "soft_stop": Oddity("CiA 402-2, 6085h", "its quick stop is softer than wanted", _soft_stop),
     "rounded_ramps": Oddity("CiA 402-2, 6083h", "ramps have a resolution of their own", _rounded_ramps),
-    "status_bits": Oddity("CiA 402-2, 6041h bits 7, 8, 11, 14, 15", "maker's bits come and go", _status_bits),
+    "status_bits": Oddity("CiA 402-2, 6041h bits 7, 8, 11, 14, 15", "manufacturer's bits come and go", _status_bits),
     "noisy_velocity": Oddity("CiA 402-2, 606Ch: no accuracy", "the measured speed has noise", _noisy_velocity),
-    "emergencies": Oddity("CiA 301, EMCY: FFxxh", "the maker's emergency messages", _emergencies),
+    "emergencies": Oddity("CiA 301, EMCY: FFxxh", "the manufacturer's emergency messages", _emergencies),
     "other_unit": Oddity("CiA 402-2, 60A9h; 608Bh, 608Ch of 2.0", "its velocities have another unit", _other_unit),
     "count_wraps": Oddity("CiA 402-2, 6064h: INTEGER32", "the counter of the encoder wraps", _count_wraps),
 }

@@ -22,7 +22,7 @@ class Drawn:
     keys: Mapping[str, Value] = field(default_factory=dict)
     """What its manual has: keys that describe the oddity, and their right values. Empty: none is needed."""
     tool: frozenset[int] = frozenset()
-    """Indexes that the maker's tool sets as they should be: then the oddity is gone."""
+    """Indexes that the manufacturer's tool sets as they should be: then the oddity is gone."""
     unusable: bool = False
     """A drive without something that canbase needs (docs/drives.md)."""
     name: str = ""

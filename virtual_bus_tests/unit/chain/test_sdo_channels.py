@@ -70,7 +70,7 @@ def test_a_drive_that_keeps_its_channel_open_gets_no_power(monkeypatch: pytest.M
     assert not world.run(5.0, lambda: any(world.powered))
     told = " ".join(node.boot_error for node in world.core._drives.nodes)
     assert "1201h:1 stays at 000006A1h" in told
-    assert "maker's tool" in told
+    assert "manufacturer's tool" in told
 
 
 # 0.3 m/s ── another client opens the channel: expedited, in segments, in a block ── trip ── closed before a reset

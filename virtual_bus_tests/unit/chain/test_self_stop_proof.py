@@ -207,7 +207,7 @@ def proven(kind: str, identity: int = 0x100) -> Robot:
     ],
 )
 def test_what_was_proven_counts_where_the_boot_cannot_see_it(kind: str, by: str) -> None:
-    """RWD of Roboteq is set by the maker's tool; 2000h of ZLTECH has no source for what the motors do."""
+    """RWD of Roboteq is set by the manufacturer's tool; 2000h of ZLTECH has no source for what the motors do."""
     world = World(proven(kind))
     world.run_until(DriverState.ENABLED, 3.0)
     assert [(drive.stops_by_itself, drive.self_stop) for drive in world.snapshot.drives] == [(True, by)] * 2

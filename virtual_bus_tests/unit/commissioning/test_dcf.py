@@ -1,4 +1,4 @@
-"""DCF files: what was read of a drive comes back byte by byte, whatever the maker's EDS is like."""
+"""DCF files: what was read of a drive comes back byte by byte, whatever the manufacturer's EDS is like."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from canbase_commissioning.parameters.value_text import INTEGER_BYTES, LONG, REA
 from canbase_config.eds_file import Eds, EdsError, read_eds, read_text
 
 REAL = Path(os.environ.get("CANBASE_EDS_FOLDER", "eds"))
-"""Files of real drives; they belong to their makers and are not part of canbase."""
+"""Files of real drives; they belong to their manufacturers and are not part of canbase."""
 REAL_FILES = sorted(file for file in REAL.glob("*") if file.suffix in (".eds", ".dcf"))
 HEADING = Heading("drive.dcf", "11-25-2026", "03:58AM", 1_000_000)
 
@@ -86,7 +86,7 @@ NodeID=99\r
 ParameterName=Device type\r
 DataType=0x0007\r
 ParameterValue=5\r
-; a comment of the maker\r
+; a comment of the vendor\r
 \r
 [2000]
 ParameterName=Text
@@ -112,7 +112,7 @@ def test_the_maker_s_lines_stay_and_values_stand_where_they_belong(tmp_path: Pat
     lines = file.read_bytes().decode().split("\r\n")
     begin = lines.index("[1000]")
     assert lines[begin + 1 : begin + 6] == [
-        "ParameterName=Device type", "DataType=0x0007", "ParameterValue=0x00020192", "; a comment of the maker", "",
+        "ParameterName=Device type", "DataType=0x0007", "ParameterValue=0x00020192", "; a comment of the vendor", "",
     ]  # fmt: skip
     assert lines[lines.index("[1003Value]") + 1 :][:2] == ["NrOfEntries=1", "2=0x00008130"]
     assert lines[lines.index("[DeviceComissioning]") + 1] == "NodeID=1"

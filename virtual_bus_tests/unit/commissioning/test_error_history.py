@@ -76,4 +76,4 @@ def test_a_drive_without_a_history_shows_what_it_has() -> None:
         "603Fh:0: 8611h following error",
         "it keeps no history: it has no 1003h",
     ]
-    assert register_text(0x81) == "81h (generic, of the maker)"
+    assert register_text(0x81) == "81h (generic, manufacturer)"

@@ -72,12 +72,12 @@ def test_a_drive_with_a_timeout_of_its_own_stops_and_needs_no_heartbeat(kind: st
     [
         (SelfStopSet(StopsBy.WATCHDOG_HEARTBEAT, "1016h watches the watchdog"), True),
         (SelfStopSet(StopsBy.NODE_GUARDING, "100Ch, 100Dh"), True),
-        (SelfStopSet(StopsBy.OWN_TIMEOUT, "heartbeat timeout of the maker (2000h:1)"), False),
+        (SelfStopSet(StopsBy.OWN_TIMEOUT, "heartbeat timeout of the manufacturer (2000h:1)"), False),
         (STOPS_BY_NOTHING, False),
     ],
 )
 def test_the_second_trial_goes_by_what_the_boot_set_and_not_by_its_words(stop: SelfStopSet, watches: bool) -> None:
-    """A maker may call a command timeout of its own a heartbeat."""
+    """A manufacturer may call a command timeout of its own a heartbeat."""
     rig = SimpleNamespace(report=lambda _joint: SimpleNamespace(self_stop=stop))
     assert watches_watchdog(cast(PoweredDrives, rig), "left") is watches
 

@@ -1,4 +1,4 @@
-"""EDS files as makers really write them, and the profiles that are drafted from them."""
+"""EDS files as manufacturers really write them, and the profiles that are drafted from them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from canbase_config.load import sample
 from canbase_config.profile_file import load_profile
 
 REAL = Path(os.environ.get("CANBASE_EDS_FOLDER", "eds"))
-"""Files of real drives; they belong to their makers and are not part of canbase."""
+"""Files of real drives; they belong to their manufacturers and are not part of canbase."""
 REAL_FILES = sorted(file for file in REAL.glob("*") if file.suffix in (".eds", ".dcf"))
 
 GOOD = """\

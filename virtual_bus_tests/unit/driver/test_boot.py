@@ -196,7 +196,7 @@ def test_a_drive_that_falls_silent_in_the_middle_is_an_error_that_names_the_obje
         "It answered before, so its node id and the bit rate are right, and the boot is tried again each second. If "
         "this goes on, check its supply and its cable, and let no other program use its SDO channel "
         "(canbase bus sdo, the "
-        "maker's tool); where the drive does not have it, `options.mode_display: no` in its drive profile."
+        "manufacturer's tool); where the drive does not have it, `options.mode_display: no` in its drive profile."
     )
 
 

@@ -27,7 +27,7 @@ from support.fake_drive import (
 )
 from support.fake_drive import robot as fake_robot
 
-BY_HAND = "with the maker's tool"
+BY_HAND = "with the manufacturer's tool"
 NO_SELF_STOP = (
     "or node guarding stops the motor: canbase setup commission shows whether it stops in another way, "
     "else only a wired STO does"
@@ -41,7 +41,8 @@ NO_SELF_STOP = (
             0x1017,
             0,
             "1017h:0: 0602 0000h the object does not exist; so its heartbeat must come by itself, within 150 ms: set "
-            "that with the maker's tool; where it has node guarding alone, set `self_stop.node_guarding: true` and "
+            "that with the manufacturer's tool; "
+            "where it has node guarding alone, set `self_stop.node_guarding: true` and "
             "`self_stop.heartbeat_entries: 0` in its drive profile",
         ),
         (
@@ -82,12 +83,12 @@ def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
         (
             0x6084,
             "how hard left brakes is unknown: it must be at least 0.5 m/s² (limits.deceleration_mps2), a value of 955 "
-            "in the unit of its profile; set it with the maker's tool",
+            "in the unit of its profile; set it with the manufacturer's tool",
         ),
         (
             0x6085,
             "how hard left brakes is unknown: it must be at least 1.5 m/s² (limits.emergency_deceleration_mps2), a "
-            "value of 2865 in the unit of its profile; set it with the maker's tool",
+            "value of 2865 in the unit of its profile; set it with the manufacturer's tool",
         ),
     ],
 )
@@ -162,7 +163,7 @@ def test_an_option_that_the_drive_changes_is_a_note() -> None:
 
     assert notes_of(boot_one_axis(FakeDrive(on_write={(0x6083, 0): clamp}))) == (
         "6083h:0 is 000003E8h, expected 00000B31h; so it may accelerate more slowly than ordered: set 6083h:0 to "
-        "00000B31h with the maker's tool",
+        "00000B31h with the manufacturer's tool",
     )
 
 
@@ -293,7 +294,8 @@ def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is
         (500, "It takes 500 ms: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
         (
             501,
-            "Nor any up to 500 ms: set 1017h:0 to 1 to 150 with the maker's tool, or, where it has node guarding alone",
+            "Nor any up to 500 ms: set 1017h:0 to 1 to 150 with the manufacturer's tool, "
+            "or, where it has node guarding alone",
         ),
         (501, "set `self_stop.node_guarding: true` and `self_stop.heartbeat_entries: 0` in its drive profile"),
     ],
@@ -324,7 +326,7 @@ def test_a_pdo_that_cannot_be_switched_off_nor_mapped_is_one_for_the_makers_tool
     assert (
         "RPDO1 cannot be switched off (1400h:1: 0601 0002h the object is read-only), nor mapped while it is on" in text
     )
-    assert "maker's tool" in text
+    assert "manufacturer's tool" in text
 
 
 @pytest.mark.parametrize(("found", "fits"), [(128, True), (150, True), (151, False), (0, False)])
@@ -373,7 +375,7 @@ def test_a_fixed_event_driven_type_is_taken_as_it_is() -> None:
 def test_a_drive_that_takes_neither_type_is_one_for_the_makers_tool() -> None:
     text = error_of(boot_one_axis(FakeDrive(refuse={(0x1400, 2): INVALID})))
     assert "1400h:2: 0609 0030h value not valid" in text
-    assert "It takes no other type either. Set 1400h:2 to 1 with the maker's tool" in text
+    assert "It takes no other type either. Set 1400h:2 to 1 with the manufacturer's tool" in text
 
 
 @pytest.mark.parametrize("abort", [0x06070010, 0x06070012, 0x06070013])
@@ -478,7 +480,10 @@ def test_a_type_of_pdo_that_is_fixed_and_waits_for_another_sync_is_one_for_the_m
     drive = FakeDrive(refuse={(0x1400, 2): READ_ONLY})
     drive.objects[0x1400, 2] = u8(10)
     text = error_of(boot_one_axis(drive))
-    assert "It takes no other type either. Set 1400h:2 to 1 with the maker's tool; where that cannot be done" in text
+    assert (
+        "It takes no other type either. Set 1400h:2 to 1 with the manufacturer's tool; where that cannot be done"
+        in text
+    )
     assert "pdo.synchronous" not in text
 
 
@@ -504,7 +509,7 @@ def test_a_drive_without_synchronous_setpoints_is_one_for_the_makers_tool_where_
         assert boot.report is not None
         assert any("it acts when it arrives (type 255 or 254)" in note for note in boot.report.notes)
     else:
-        assert "It takes no other type either. Set 1400h:2 to 1 with the maker's tool" in error_of(boot)
+        assert "It takes no other type either. Set 1400h:2 to 1 with the manufacturer's tool" in error_of(boot)
 
 
 @pytest.mark.parametrize(("takes", "key_helps"), [({1}, True), ({0}, False)])
@@ -742,4 +747,4 @@ def test_a_drive_that_reads_back_another_mapping_is_told_what_its_pdo_needs() ->
 
     text = error_of(boot_one_axis(FakeDrive(on_write={(0x1600, 0): swaps})))
     assert "RPDO1 reads back another mapping than was written to 1600h" in text
-    assert "Let RPDO1 carry 6040h:0, 60FFh:0 with the maker's tool" in text
+    assert "Let RPDO1 carry 6040h:0, 60FFh:0 with the manufacturer's tool" in text

@@ -161,7 +161,7 @@ def test_a_fault_stops_it_and_needs_a_reset(kind: str) -> None:
     ("kind", "code", "text"),
     [
         ("epos4", 0x8A88, "8A88h safe torque off (STO) is active"),
-        ("elmo_gold", 0xFF00, "FF00h code of the maker, see its error field"),
+        ("elmo_gold", 0xFF00, "FF00h code of the manufacturer, see its error field"),
         ("elmo_gold", 0x8480, "8480h speed error too large"),
         ("technosoft", 0x5441, "5441h switched off by the enable or STO input"),
         ("nanotec", 0x7305, "7305h sensor 1 of 3204h"),

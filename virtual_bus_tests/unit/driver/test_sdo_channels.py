@@ -122,7 +122,9 @@ def test_a_channel_that_stays_open_gets_no_power_and_the_message_names_it(code: 
     told = error_of(booted(with_channels(OPEN, refuse={(0x1201, 1): code, (0x1201, 2): code})))
     assert told.startswith("node 1: 1201h:1 stays at 000006A1h (")
     assert "takes requests by 6A1h" in told
-    cure = "switch the drive off and on again" if code == DEVICE_STATE else "Close it with the maker's tool (bit 31"
+    cure = (
+        "switch the drive off and on again" if code == DEVICE_STATE else "Close it with the manufacturer's tool (bit 31"
+    )
     assert cure in told
 
 

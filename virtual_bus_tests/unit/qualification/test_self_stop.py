@@ -28,7 +28,7 @@ def first(profile: str) -> OwnStop:
         ("technosoft", StopsItself.YES, "the watchdog guards it"),
         ("tmcm1636", StopsItself.NO, "no 6007h"),
         ("dryve_d1", StopsItself.NO, "no 6007h"),
-        ("roboteq", StopsItself.NO, "maker's tool"),
+        ("roboteq", StopsItself.NO, "manufacturer's tool"),
         ("zlac8015d", StopsItself.UNPROVEN, "set by the boot"),
         ("kinco", StopsItself.UNPROVEN, "heartbeat_entries"),
         ("nanotec", StopsItself.UNPROVEN, "abort_connection"),
