@@ -1,6 +1,6 @@
 """One goal from its acceptance to its outcome: DRIVING → STOPPING → ENDED. Knows no ROS and reads no clock.
 
-Rules. Every ending passes through STOPPING: zero is ordered, and the goal ends when the base is known to stand. A goal
+Rules. Every ending passes through STOPPING: zero is commanded; the goal ends once the base is known to stand. A goal
 that comes to stand short of its goal goes on. `causes.py`: why a goal ends; `standstill.py`: does the base stand.
 """
 

@@ -15,13 +15,13 @@ from canbase_cli.sdo import NodeArgument
 app = typer.Typer(help="Save, compare and restore the parameters of a drive.", no_args_is_help=True)
 
 SAVE_EPILOG: Final = (
-    "Example:  \ncanbase bus params save 1 --eds maker.eds left.dcf --config robot.yaml"
+    "Example:  \ncanbase bus params save 1 --eds vendor.eds left.dcf --config robot.yaml"
 )  # fmt: skip
 DIFF_EPILOG: Final = (
     "Examples:  \ncanbase bus params diff left.dcf 1 --config robot.yaml      (what has changed since)  \n"
-    "canbase bus params diff 1 2 --eds maker.eds --channel can0  (two drives)  \n"
+    "canbase bus params diff 1 2 --eds vendor.eds --channel can0  (two drives)  \n"
     "canbase bus params diff left.dcf boot --config robot.yaml   (what canbase sets at its start)  \n"
-    "canbase bus params diff maker.eds 1 --channel can0          (against the manufacturer's defaults)"
+    "canbase bus params diff vendor.eds 1 --channel can0          (against the manufacturer's defaults)"
 )
 RESTORE_EPILOG: Final = (
     "Examples:  \ncanbase bus params restore left.dcf --config robot.yaml  \n"

@@ -15,13 +15,13 @@ app = typer.Typer(help="Read or write one object of a node.", no_args_is_help=Tr
 
 READ_EPILOG: Final = (
     "Examples:  \ncanbase bus sdo read 1 6041 --channel can0  \ncanbase bus sdo read 2 1018:4 --config robot.yaml  \n"
-    "canbase bus sdo read 1 0x2000:0 --type u16 --raw  \ncanbase bus sdo read 1 'Target velocity' --eds maker.eds  \n"
+    "canbase bus sdo read 1 0x2000:0 --type u16 --raw  \ncanbase bus sdo read 1 'Target velocity' --eds vendor.eds  \n"
     "canbase bus sdo read 1 Identity.Vendor-ID --channel can0"
 )
 WRITE_EPILOG: Final = (
     "Examples:  \ncanbase bus sdo write 1 1017 100 --channel can0  \ncanbase bus sdo write 1 605A 0x2 "
     "--config robot.yaml  \n"
-    "canbase bus sdo write 1 'Profile acceleration' 2000 --eds maker.eds"
+    "canbase bus sdo write 1 'Profile acceleration' 2000 --eds vendor.eds"
 )
 
 NodeArgument = Annotated[

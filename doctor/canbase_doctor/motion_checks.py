@@ -73,7 +73,7 @@ def driver_watchdog(seen: Evidence) -> Check:
         return fail(name, f"the watchdog is {status.watchdog}", "use the emergency stop; start it, canbase reset")
     if not status.standstill and (order is None or not _moves(order)):
         return fail(
-            name, "zero is ordered, but a wheel turns", "use the emergency stop; then brake, slope, or drive settings"
+            name, "zero is commanded, but a wheel turns", "use the emergency stop; then brake, slope, or drive settings"
         )
     return ok(name, "the base is stationary" if status.standstill else "the base moves as cmd_vel orders")
 

@@ -73,7 +73,7 @@ def _measured(report: Report) -> Section:
     ]
     rows += [_row(f"{plain(name)} (no row of the catalogue)", stops, setup) for name, stops in report.unlisted if stops]
     if report.ordinary_stops is not None:
-        rows.append(_row("Ordinary stop: zero is ordered, nothing fails.", report.ordinary_stops, setup))
+        rows.append(_row("Ordinary stop: zero is commanded, nothing fails.", report.ordinary_stops, setup))
     columns = (
         "hazard", "runs", "acts within", *(f"time {name}" for name in SHARES), "time max",
         *(f"distance {name}" for name in SHARES), "distance max", "max covers", "worst run", "replay",

@@ -28,7 +28,7 @@ def log_stop(job: Job, seed: int, say: Say, *, frames: bool) -> bool:
     tell(cruise.world, frames, lambda at_s, text: say(f"{at_s:8.4f} {text}"))
     run = cruise.run(failure, seed)
     stood = math.isfinite(run.time_s)
-    ends = f"at a stand after {run.time_s:.3f} s" if stood else "it goes on"
+    ends = f"at standstill after {run.time_s:.3f} s" if stood else "it goes on"
     power = f"without power after {run.power_off_s:.3f} s" if math.isfinite(run.power_off_s) else "with power"
     say(f"from {run.speed_mps:.3f} m/s: {ends}, {run.distance_m:.3f} m, {power}; {run.cause or 'no part stopped it'}")
     return stood

@@ -88,13 +88,13 @@ CASES = (
     Case(
         "driver_repeats_setpoints",
         DRIVER,
-        "repeats its last setpoints for ever, then zero is ordered",
+        "repeats its last setpoints for ever, then zero is commanded",
         from_fastest=1.5,
     ),
-    Case("driver_repeats_setpoints", DRIVER, "ignores zero, then zero is ordered", from_fastest=1.5),
+    Case("driver_repeats_setpoints", DRIVER, "ignores zero, then zero is commanded", from_fastest=1.5),
     Case("wheel_does_not_follow", "wheel", "blocked", from_slowest=1.0),
     Case("motor_without_force", "wheel", "motor without force", alone=True, from_slowest=1.5),
-    Case("setpoint_lost_at_the_drive", "wheel", "setpoints lost, then zero is ordered", from_slowest=1.5),
+    Case("setpoint_lost_at_the_drive", "wheel", "setpoints lost, then zero is commanded", from_slowest=1.5),
 )
 
 

@@ -30,14 +30,14 @@ def test_a_time_holds_on_drawn_robots_at_drawn_motions(case: Case) -> None:
 @pytest.mark.parametrize(
     ("how", "number", "motion"),
     [
-        ("repeats its last setpoints for ever, then zero is ordered", 0, Motion(0.8, 2.0)),
-        ("repeats its last setpoints for ever, then zero is ordered", 4, Motion(0.692, 0.0)),
-        ("repeats its last setpoints for ever, then zero is ordered", 18, Motion(0.0, 0.666)),
-        ("repeats its last setpoints for ever, then zero is ordered", 36, Motion(0.0, 1.08)),
-        ("ignores zero, then zero is ordered", 1, Motion(0.227, 0.0)),
+        ("repeats its last setpoints for ever, then zero is commanded", 0, Motion(0.8, 2.0)),
+        ("repeats its last setpoints for ever, then zero is commanded", 4, Motion(0.692, 0.0)),
+        ("repeats its last setpoints for ever, then zero is commanded", 18, Motion(0.0, 0.666)),
+        ("repeats its last setpoints for ever, then zero is commanded", 36, Motion(0.0, 1.08)),
+        ("ignores zero, then zero is commanded", 1, Motion(0.227, 0.0)),
         ("motor without force", 0, Motion(0.48, -1.452)),
         ("motor without force", 13, Motion(0.891, -2.122)),
-        ("setpoints lost, then zero is ordered", 2, Motion(0.484, 0.84)),
+        ("setpoints lost, then zero is commanded", 2, Motion(0.484, 0.84)),
     ],
 )
 def test_the_worst_motions_that_a_search_found(how: str, number: int, motion: Motion) -> None:

@@ -83,7 +83,7 @@ def goes_on(world: World, pulse_s: float = 9.0) -> None:
 
 
 def creeps(world: World) -> None:
-    """Where zero is ordered the driver sends setpoints of 4 cm/s."""
+    """Where zero is commanded the driver sends setpoints of 4 cm/s."""
     changed = world.driver._changed
 
     def creeping(frames: list[Frame]) -> list[Frame]:

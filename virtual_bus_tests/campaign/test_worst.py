@@ -68,7 +68,7 @@ def test_the_page_has_each_stated_time_beside_the_worst_that_was_found() -> None
 
 
 @pytest.mark.parametrize(
-    "name", ["cmd_vel: another node publishes to it, then zero is ordered", "encoder: lost: nothing counts, no speed"]
+    "name", ["cmd_vel: another node publishes to it, then zero is commanded", "encoder: lost: nothing counts, no speed"]
 )
 def test_the_page_has_the_time_that_is_found_today(name: str) -> None:
     """Of two failures whose reaction depends on many rules; `make worst ROWS=1` writes all."""

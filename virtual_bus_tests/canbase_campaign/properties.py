@@ -14,7 +14,7 @@ PROPERTIES = {
     "enabling": "no drive gets power without a watchdog that lives and is not tripped",
     "heartbeat": "a drive that hears neither watchdog nor driver stops by itself",
     "estop": "the base stands while the emergency stop is pressed",
-    "rest": "while zero is ordered no wheel creeps for longer than the stated time, and a base at rest stays there",
+    "rest": "while zero is commanded no wheel creeps for longer than the stated time, and a base at rest stays there",
     "pauses": "after a lock, or a second without scans, a joystick that was held moves nothing before it shows zero",
     "zero": "after the emergency stop nothing is ordered before the command was zero once",
     "obstacle": "the base never touches what it could have seen in time",

@@ -1,7 +1,7 @@
 """At zero order the base comes to rest, and stays. `envelope` bounds what is faster than its tolerance; this the rest.
 
 Within that tolerance a wheel could creep for ever: at 6 cm/s a base that is "stopped" is a metre further in 17 s. So
-the seconds are counted in which a wheel creeps while zero is ordered, with or without pauses, until motion is ordered.
+the seconds are counted in which a wheel creeps while zero is commanded, even with pauses, until motion is.
 """
 
 from __future__ import annotations
@@ -53,4 +53,4 @@ class RestJudge:
         over_s = self._creeps_s - self.allowed_s
         if not is_late("rest", self._ledger, over_s, gives.items()):
             return ""
-        return f"a wheel turns at {fastest_mps:.3f} m/s, for {self._creeps_s:.2f} s in all, while zero is ordered"
+        return f"a wheel turns at {fastest_mps:.3f} m/s, for {self._creeps_s:.2f} s in all, while zero is commanded"

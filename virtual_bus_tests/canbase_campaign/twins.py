@@ -26,7 +26,7 @@ SPEED_MPS = 0.4
 
 @dataclass(frozen=True, slots=True)
 class Twin:
-    """One failure. `by`: the source that drives. `then_zero_s`: this long after it zero is ordered, and measured from;
+    """One failure. `by`: the source that drives. `then_zero_s`: this long after it zero is commanded and measured from;
     0: never.
 
     `lies`: a sensor or a wheel differs from its description, so a wheel may become faster than ordered.
@@ -128,10 +128,11 @@ STOPS: tuple[Twin, ...] = (
     Twin("drive", "STO opens", fault("drive_sto")),
     Twin("drive", "reset: without power for 0.5 s", fault("drive_power_cycle", off_s=0.5)),
     Twin("drive", "starts again", fault("drive_resets")),
-    Twin(DRIVER, "repeats its last setpoints for ever, then zero is ordered", fault("driver_repeats", heartbeats=True),
+    Twin(DRIVER, "repeats its last setpoints for ever, then zero is commanded",
+         fault("driver_repeats", heartbeats=True),
          JOYSTICK, ZERO_S),
-    Twin(DRIVER, "ignores zero, then zero is ordered", _ignores_zero, JOYSTICK, ZERO_S),
-    Twin("cmd_vel", "another node publishes to it, then zero is ordered", _straight_to_cmd_vel, JOYSTICK, ZERO_S),
+    Twin(DRIVER, "ignores zero, then zero is commanded", _ignores_zero, JOYSTICK, ZERO_S),
+    Twin("cmd_vel", "another node publishes to it, then zero is commanded", _straight_to_cmd_vel, JOYSTICK, ZERO_S),
     Twin("second master", "sends setpoints and SYNC", _second_master),
     Twin("joystick", "dies", _joystick_dies, JOYSTICK),
     Twin("odometry", "stale", fault("odometry_lost")),
@@ -145,8 +146,8 @@ STOPS: tuple[Twin, ...] = (
 LIES: tuple[Twin, ...] = (
     Twin("drive", "encoder frozen", drive("frozen_encoder")),
     Twin("drive", "actual velocity stuck at 0", drive("stuck_velocity", raw=0)),
-    Twin("drive", "actual velocity stuck, then zero is ordered", drive("stuck_velocity"), JOYSTICK, ZERO_S),
-    Twin("drive", "ignores its setpoints, then zero is ordered", drive("ignores_setpoints"), JOYSTICK, ZERO_S),
+    Twin("drive", "actual velocity stuck, then zero is commanded", drive("stuck_velocity"), JOYSTICK, ZERO_S),
+    Twin("drive", "ignores its setpoints, then zero is commanded", drive("ignores_setpoints"), JOYSTICK, ZERO_S),
     Twin("encoder", "lost: nothing counts, no speed", drive("encoder_lost"), JOYSTICK),
     Twin("encoder", "frozen: nothing counts, the last speed", drive("encoder_frozen"), JOYSTICK),
     Twin("encoder", "counts backward", drive("encoder_reversed"), JOYSTICK),
@@ -155,7 +156,7 @@ LIES: tuple[Twin, ...] = (
     Twin("wheel", "blocked", drive("blocked"), JOYSTICK),
     Twin("wheel", "follows half of its setpoint", drive("limited", share=0.5), JOYSTICK),
     Twin("wheel", "motor without force", drive("weak"), JOYSTICK),
-    Twin("wheel", "setpoints lost, then zero is ordered", drive("rpdo_lost"), JOYSTICK, ZERO_S),
+    Twin("wheel", "setpoints lost, then zero is commanded", drive("rpdo_lost"), JOYSTICK, ZERO_S),
     Twin("wheel", "feedback lost", drive("tpdo_lost"), JOYSTICK),
     Twin("twin node", "a second drive with the same node id, at standstill", fault("twin_node"), JOYSTICK),
 )
@@ -168,7 +169,7 @@ DELIVERY: tuple[Twin, ...] = (
     Twin("adapter", "of the watchdog fails", fault("watchdog_bus_problem")),
     Twin("velocity_mux", "its orders do not arrive", fault("mux_lossy", share=1.0)),
     Twin("motor_driver/status", "does not arrive", fault("status_lost")),
-    Twin("joystick", "comes 2 s late, then zero is ordered", fault("orders_delayed", value=2.0), JOYSTICK, ZERO_S),
+    Twin("joystick", "comes 2 s late, then zero is commanded", fault("orders_delayed", value=2.0), JOYSTICK, ZERO_S),
     Twin("scan", "repeats its readings with new stamps", fault("scanner_frozen", margin_m=None)),
     Twin("scan", "repeats three scans by turns", fault("scanner_by_turns", margin_m=None)),
     Twin("frames", "come twice, one of five", fault("frame_duplication", value=0.2)),

@@ -193,7 +193,7 @@ BUS = (
     Row("drive", "actual velocity stuck at 0", fault("stuck_velocity", 1, raw=0), (by.WATCHDOG_FEEDBACK,), heal),
     Row(
         "drive",
-        "actual velocity stuck, then zero is ordered",
+        "actual velocity stuck, then zero is commanded",
         then_zero(fault("stuck_velocity", 1)),
         (by.WATCHDOG_STUCK,),
         heal,
@@ -201,7 +201,7 @@ BUS = (
     ),
     Row(
         "drive",
-        "ignores its setpoints, then zero is ordered",
+        "ignores its setpoints, then zero is commanded",
         then_zero(fault("ignores_setpoints", 1)),
         (by.WATCHDOG_MOTION,),
         heal,
@@ -209,7 +209,7 @@ BUS = (
     ),
     Row(
         "motor_driver",
-        "repeats its last setpoints for ever, then zero is ordered",
+        "repeats its last setpoints for ever, then zero is commanded",
         then_zero(breaks(DRIVER, "repeat_setpoints")),
         (by.WATCHDOG_KEPT,),
         ends(DRIVER),
@@ -218,7 +218,7 @@ BUS = (
     ),
     Row(
         "motor_driver",
-        "ignores zero, then zero is ordered",
+        "ignores zero, then zero is commanded",
         then_zero(breaks(DRIVER, "ignore_zero")),
         (by.WATCHDOG_KEPT,),
         ends(DRIVER),
@@ -226,7 +226,7 @@ BUS = (
     ),
     Row(
         "cmd_vel",
-        "another node publishes to it, then zero is ordered",
+        "another node publishes to it, then zero is commanded",
         then_zero(publish_straight),
         (by.WATCHDOG_KEPT,),
         publish_no_more,

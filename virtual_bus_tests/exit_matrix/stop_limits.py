@@ -86,7 +86,7 @@ def source(name: str) -> Seconds:
 
 
 def kept_setpoint(robot: Robot, speed_mps: float) -> float:
-    """Until a setpoint that stays, while zero is ordered, is outside of what the leases allow."""
+    """Until a setpoint that stays, while zero is commanded, is outside of what the leases allow."""
     return order_hold_s(robot) + target_slack_mps(robot, speed_mps) / robot.limits.deceleration_mps2
 
 

@@ -24,7 +24,7 @@ def chain(module_chain: Chain) -> Chain:
 
 
 def followed(chain: Chain, seconds: float = 1.0) -> bool:
-    """Whether anything but zero is ordered from now on."""
+    """Whether anything but zero is commanded from now on."""
     return chain.ordered_for(seconds) != {0.0}
 
 

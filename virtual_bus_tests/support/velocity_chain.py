@@ -81,7 +81,7 @@ class Chain:
             node.spin_for(SILENT_S)
 
     def rest(self) -> None:
-        """For the next test: nothing stops the base, every source is released and silent, zero is ordered."""
+        """For the next test: nothing stops the base, every source is released and silent, zero is commanded."""
         self.scan.message, self.scan.prepare = scan(), self._fresh_scan
         self.driver.message = DriverStatus(state=DriverStatus.ENABLED)
         self.joystick.message = self.action.message = drive(0.0)

@@ -149,7 +149,7 @@ class ReleaseTest:
         self._returned = self._returned or not ramps
 
     def step(self, wheels: Sequence[Wheel], rests: bool, now_s: float) -> None:
-        """One cycle in which the drives are to be enabled; `rests`: zero is ordered of all wheels."""
+        """One cycle in which the drives are to be enabled; `rests`: zero is commanded of all wheels."""
         if self._phase is ReleasePhase.HELD and rests and self._is_due(wheels):
             self._phase, self._since, self._returned = ReleasePhase.RELEASING, now_s, False
         elif self._phase is ReleasePhase.RELEASING and all(

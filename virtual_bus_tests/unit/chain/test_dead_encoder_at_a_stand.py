@@ -48,7 +48,7 @@ def lose(world: World) -> None:
 
 
 def course(world: World, seconds: float, until_s: float = 0.0) -> Course:
-    """`until_s`: then zero is ordered."""
+    """`until_s`: then zero is commanded."""
     assert world.watchdog is not None
     start, before_m, seen = world.now_s, world.bench.base.travel_left_m, Course()
     while world.now_s < start + seconds:

@@ -78,5 +78,5 @@ def test_a_stop_is_told_until_the_base_stands() -> None:
     assert f"stop {ESTOP}: emergency stop: pressed" in text
     assert "× 2, slope" in text
     assert "driver 080" in text
-    assert "from 0.800 m/s: at a stand after 0.5" in text
+    assert "from 0.800 m/s: at standstill after 0.5" in text
     assert "safety filter: estop" in text

@@ -110,7 +110,7 @@ def test_each_hazard_with_stops_has_its_line_and_its_command() -> None:
     assert killed[11] == "99.7 %"
     assert killed[-1] == "`canbase prove qualify robot.yaml --stop 1000`"
     assert rows[f"{STRANGE} (no row of the catalogue)"][1] == "5"
-    assert rows["Ordinary stop: zero is ordered, nothing fails."][1] == "10"
+    assert rows["Ordinary stop: zero is commanded, nothing fails."][1] == "10"
 
 
 def test_few_runs_say_how_many_a_quantile_needs() -> None:

@@ -281,7 +281,7 @@ def test_a_base_with_one_side_in_the_air_turns_about_it() -> None:
 
 
 def test_a_motor_without_a_coupling_turns_alone_and_its_wheel_rolls_out() -> None:
-    """t   0 both at 0.5 m/s; the left coupling breaks, and zero is ordered"""
+    """t   0 both at 0.5 m/s; the left coupling breaks, and zero is commanded"""
     robot = Robot()
     robot.order(0.5, 0.5)
     robot.run(1.0)

@@ -181,7 +181,7 @@ def test_a_sensor_that_contradicts_itself_is_doubted_until_a_reset() -> None:
 
 
 def held_until_its_order_has_gone(**changes: Any) -> Wheel:
-    """Against a threshold for 12/64 s; then zero is ordered, and it is free."""
+    """Against a threshold for 12/64 s; then zero is commanded, and it is free."""
     wheel = rolling(0.5, **changes)
     last = wheel.samples(12, 0.5, 0.0, torque=1.0)
     assert (last.unseen_s, last.unseen_m) == (12 / HZ, 6 / HZ)
