@@ -227,9 +227,7 @@ def _life(seen: BusEvidence, name: str, found: Inspection) -> Check:
         return warn(f"{name}: state", f"{told}; EMCY {emcy.text}", "remove the cause")
     node = seen.heard.nodes.get(found.node_id)
     if seen.heard.driver_lives and (node is None or node.nmt_state is not NmtState.OPERATIONAL):
-        return fail(
-            f"{name}: state", f"{told}; it is not in NMT operational beside a driver", _advice(seen, found.node_id)
-        )
+        return fail(f"{name}: state", f"{told}; it is not in NMT operational beside a driver", NOT_BOOTED)
     return ok(f"{name}: state", told)
 
 
@@ -244,23 +242,32 @@ def _ages(seen: BusEvidence, node_id: int) -> str:
     return f"{node.state_text}, {heartbeat}, {tpdo}"
 
 
-def _advice(seen: BusEvidence, node_id: int) -> str:
-    """What a difference beside a running driver means: a drive in NMT operational was booted by it, the others not."""
+NOT_BOOTED: Final = (
+    "the driver could not boot this drive: the reason is in its log and in boot_problem of motor_driver/status"
+)
+
+
+def _differs(seen: BusEvidence, name: str, node_id: int, told: str) -> Check:
+    """Beside a running driver. A drive in NMT operational was booted by it, the others not.
+
+    What a drive refuses, the boot notes or replaces. Nothing on the bus tells that from a change that came later.
+    """
     node = seen.heard.nodes.get(node_id)
-    if node is not None and node.nmt_state is NmtState.OPERATIONAL:
-        return "something has changed it since its boot: restart motor_driver, and look for another master or tool"
-    return "the driver could not boot this drive: the reason is in its log and in boot_problem of motor_driver/status"
+    if node is None or node.nmt_state is not NmtState.OPERATIONAL:
+        return fail(name, told, NOT_BOOTED)
+    advice = "restart motor_driver. What still differs, the drive refuses: the boot's notes in the driver's log say so"
+    return warn(name, f"{told}. The drive refused it at its boot, or it has been changed since: cannot tell", advice)
 
 
 def _configured(seen: BusEvidence, name: str, node_id: int, part: Part) -> Check:
-    """Beside a running driver a difference is wrong; without it the driver writes it at its start."""
+    """Without a driver, a difference is what the driver writes at its start."""
     if part.problem:
         return fail(name, part.problem, "docs/drives.md lists what a drive must have")
     if not part.changes:
         return ok(name, "as in robot.yaml")
     told = f"{len(part.changes)} differences: {_some(part.changes)}"
     if seen.heard.driver_lives:
-        return fail(name, told, _advice(seen, node_id))
+        return _differs(seen, name, node_id, told)
     return ok(name, f"{told}. The driver writes them at its start")
 
 
@@ -272,7 +279,7 @@ def _self_stop(seen: BusEvidence, name: str, found: Inspection) -> Check:
     set_now = not found.self_stop_part.changes
     if not set_now and seen.heard.driver_lives:
         changes = _some(found.self_stop_part.changes)
-        return fail(name, f"not now: {changes}", _advice(seen, found.node_id))
+        return _differs(seen, name, found.node_id, f"not as the boot sets it: {changes}")
     when = "set" if set_now else "when the driver has set it"
     notes = f"; {_some(found.self_stop_part.notes)}" if found.self_stop_part.notes else ""
     return ok(name, f"by {found.self_stop}, {when}{notes}. canbase setup commission proves it")

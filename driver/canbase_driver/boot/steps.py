@@ -163,8 +163,9 @@ class NodeAccess:
         return False
 
     def note_change(self, step: Write, before: str) -> None:
-        """It was written, in place of `before`."""
-        self.changes.append(f"{step}: {before} → {_hex(step.data)}")
+        """It was written, in place of `before`. A PDO that was off meanwhile has not changed."""
+        if before != _hex(step.data):
+            self.changes.append(f"{step}: {before} → {_hex(step.data)}")
 
     def set_if_present(
         self, step: Write, presence: Presence = "probe", known: int | None = None, *, unread: bool = False

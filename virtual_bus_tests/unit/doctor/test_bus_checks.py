@@ -134,10 +134,17 @@ def test_the_watchdogs_counters_are_shown_and_refused_leases_are_a_warning() -> 
 
 
 @pytest.mark.parametrize("part", ["settings", "pdos", "self_stop_part"])
-def test_a_difference_is_wrong_beside_the_driver_and_expected_without_it(part: str) -> None:
+def test_a_difference_is_expected_without_the_driver_and_beside_it_accuses_nobody(part: str) -> None:
+    """A drive that refuses a value at its boot differs for good, and is well."""
     differs = {1: inspection(1, **{part: Part(("6085h:0: 01h → 02h",))}), 2: inspection(2)}
-    assert [verdict for _, verdict in not_ok(evidence(inspections=differs))] == [Verdict.FAIL]
     assert not_ok(alone(inspections=differs)) == []
+    seen = evidence(inspections=differs)
+    [(name, verdict)] = not_ok(seen)
+    assert verdict is Verdict.WARN
+    assert "or it has been changed since: cannot tell → restart motor_driver" in row(seen, name)
+    stopped = evidence(inspections=differs, heard=heard(*DRIVER, *WATCHDOG, "701 7F", *DRIVES[1:]))
+    assert [verdict for _, verdict in not_ok(stopped)].count(Verdict.FAIL) == 2
+    assert "could not boot this drive" in row(stopped, name)
 
 
 def test_a_drive_that_cannot_stop_by_itself_is_a_warning_that_names_sto() -> None:

@@ -14,6 +14,8 @@ from canbase_driver.boot.node_boot import NodeBoot, sdo_client
 from canbase_driver.boot.settings import HEARTBEAT_CONSUMER
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import DriveState
+from canbase_sim.cia301 import abort
+from canbase_sim.cia301.dictionary import SdoAbortedError
 from canbase_sim.personality import PERSONALITIES
 from support.crews import robot_with
 from support.session_world import SessionWorld
@@ -93,6 +95,20 @@ def test_what_somebody_changed_afterwards_is_named_with_both_values() -> None:
     assert found[1].self_stop_part.changes == ()
     assert found[2].self_stop_part.changes == ("1016h:1: 00000000h → 007E012Ch",)
     assert [change[:8] for change in found[2].settings.changes] == ["6085h:0:"]
+
+
+def test_what_the_boot_would_only_switch_off_and_on_again_is_no_difference() -> None:
+    """The drive refuses the synchronous types, so the boot takes another one: that is all that differs."""
+
+    def refuse(sub: int, value: int) -> None:
+        if sub == 2 and value <= 240:
+            raise SdoAbortedError(abort.INVALID_VALUE)
+
+    world = SessionWorld()
+    for node in world.bench.nodes.values():
+        node.dictionary.guard(0x1800, refuse)
+    world.run(BootSession(world.robot))
+    assert inspected(world)[1].pdos.changes == ("1800h:2: FFh → 01h",)
 
 
 def test_a_target_that_the_driver_has_ordered_is_no_difference() -> None:
