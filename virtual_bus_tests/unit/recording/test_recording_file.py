@@ -70,6 +70,25 @@ def test_what_python_can_writes_is_read(tmp_path: Path, suffix: str, form: str) 
     assert recording.problems.sentences == []
 
 
+def test_a_trc_file_with_the_date_of_its_start_begins_at_zero(tmp_path: Path) -> None:
+    path = tmp_path / "bus.trc"
+    path.write_text(
+        ";$FILEVERSION=2.1\n;$STARTTIME=44654.5\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n"
+        "      1      1000.000 DT 1      0181 Rx -  2    37 02\n"
+        "      2      1250.000 DT 1      0080 Rx -  0    \n"
+    )
+    entries, recording = read(path)
+    assert [entry.at_s for entry in entries] == pytest.approx([0.0, 0.25])
+    assert recording.began_s == pytest.approx((44654.5 - 25569.0) * 86_400.0 + 1.0)
+
+
+def test_a_trc_file_of_another_manufacturer_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bus.trc"
+    path.write_text("ASCII Trace IXXAT Automation GmbH  V1.1\n(00:00:01.500) 181 Std 37 02\n")
+    with pytest.raises(NoRecordingError, match="it begins with 'ASCII Trace"):
+        RecordingFile(path)
+
+
 def test_what_candump_prints_on_a_screen_is_read_too(tmp_path: Path) -> None:
     path = tmp_path / "screen.txt"
     path.write_text(
