@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from canopen import SdoAbortedError
 
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.sdo_session import SdoSession
@@ -15,7 +16,6 @@ from canbase_driver.boot.settings import HEARTBEAT_CONSUMER
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia402 import DriveState
 from canbase_sim.cia301 import abort
-from canbase_sim.cia301.dictionary import SdoAbortedError
 from canbase_sim.personality import PERSONALITIES
 from support.crews import robot_with
 from support.session_world import SessionWorld
