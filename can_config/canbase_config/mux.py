@@ -49,14 +49,6 @@ class MuxSource(Section):
             description="without a message for longer: may start without a zero command; null: never [s]",
         ),
     ] = None
-    yields_after_zero_s: Annotated[
-        float | None,
-        Field(
-            ge=1.0,
-            le=60.0,
-            description="zero commands for longer: lower sources may drive, after a zero of theirs; null: never [s]",
-        ),
-    ] = None
     same_clock: Annotated[
         bool,
         Field(description="true: its stamps use this computer's clock, or one kept in step: their age is the delay"),

@@ -183,7 +183,6 @@ WITHOUT_RESERVE: Final = {
     "timeouts.boot_s": _HUMAN,
     "mux.twist_mux_timeout_s": "becomes the timeout_s of a source",
     "mux.sources.….timeout_s": f"{_PUBLISHER} (a source on {ACTION_TOPIC} has a rule)",
-    "mux.sources.….yields_after_zero_s": "a person's pause; what moves after it has shown zero since",
     "mux.sources.….neutral_after_s": "not less than the timeout_s of the source: refused with both numbers",
     "mux.locks.….timeout_s": _PUBLISHER,
     "safety.scan.timeout_s": _PUBLISHER,

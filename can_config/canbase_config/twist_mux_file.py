@@ -94,18 +94,17 @@ def _parameters(files: Sequence[YamlFile]) -> dict[str, Parameter]:
     for name, given in nodes.items():
         if re.fullmatch(_WILDCARD.sub(_any_names, re.escape(name)), own):
             parameters |= given
+        elif foreign := next((parameter for dotted, parameter in given.items() if _in_a_group(dotted)), None):
+            what = f"topics or locks of {name}, which is not the node {own}: keep those of one node"
+            raise ConfigError([Problem(foreign.place.file, foreign.place.line, foreign.place.key, what)])
     _refuse_useless(files, parameters)
     return parameters
 
 
 def _own_node(nodes: Mapping[str, Mapping[str, Parameter]]) -> str:
     """The node that has topics or locks itself; where only `/**` has them, the one that is called twist_mux."""
-    named = [name for name, given in nodes.items() if "*" not in name and any(map(_in_a_group, given))]
-    if len(named) > 1:
-        place = next(iter(nodes[named[-1]].values())).place
-        both = " and ".join(name.strip("/") for name in named)
-        raise ConfigError([Problem(place.file, None, "", f"has topics or locks of {both}; keep those of one node")])
-    return next(iter(named), next((name for name in nodes if name.endswith(f"/{NODE}")), f"/{NODE}"))
+    named = (name for name, given in nodes.items() if "*" not in name and any(map(_in_a_group, given)))
+    return next(named, next((name for name in nodes if name.endswith(f"/{NODE}")), f"/{NODE}"))
 
 
 def _any_names(wildcard: re.Match[str]) -> str:

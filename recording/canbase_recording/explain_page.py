@@ -54,10 +54,9 @@ def _stops(told: Explanation) -> Iterator[Html]:
 
 
 def _stop(number: int, story: Story, told: Explanation) -> Html:
-    delay_ms = 1000.0 * (story.scene.reaction_s - story.found.at_s)
     facts = [("what shows it", story.found.text)]
     if story.caught_by:
-        facts.append(("caught by", f"{story.caught_by}, {delay_ms:.0f} ms later: {story.reported}"))
+        facts.append(("caught by", story.caught))
     facts += [("standstill", standstill_sentence(story)), ("look at", story.advice)]
     facts += [("also seen", f"{cause.value}: {found.text}") for cause, found in story.also]
     return section(

@@ -62,8 +62,7 @@ def _story(number: int, count: int, story: Story) -> Iterator[str]:
     yield f"  first cause:  {story.cause.value}"
     yield f"                {story.found.text}"
     if story.caught_by:
-        delay_ms = 1000.0 * (story.scene.reaction_s - story.found.at_s)
-        yield f"  caught by:    {story.caught_by}, {delay_ms:.0f} ms later: {story.reported}"
+        yield f"  caught by:    {story.caught}"
     yield f"  standstill:   {standstill_sentence(story)}"
     yield f"  look at:      {story.advice}"
     for cause, found in story.also:

@@ -104,6 +104,8 @@ class Story:
     cause: Cause
     found: Found
     caught_by: str
+    caught_s: float
+    """When that part acted [s]; infinity: none did."""
     reported: str
     also: tuple[tuple[Cause, Found], ...]
     chain: tuple[Event, ...]
@@ -115,6 +117,12 @@ class Story:
         """What to look at first."""
         return ADVICE[self.cause]
 
+    @property
+    def caught(self) -> str:
+        """Who acted, how long after the cause, and its reason; empty: nobody."""
+        delay_ms = 1000.0 * (self.caught_s - self.found.at_s)
+        return self.caught_by and f"{self.caught_by}, {delay_ms:.0f} ms later: {self.reported}"
+
 
 def tell(scene: Scene) -> Story:
     """The story of one stop."""
@@ -122,11 +130,12 @@ def tell(scene: Scene) -> Story:
     seen = [(cause, found) for cause, found in evidence if found is not None and math.isfinite(found.at_s)]
     cause, found = seen[0] if seen else _unknown(scene)
     chain = tuple(event for event in scene.events if event.at_s >= found.at_s - BEFORE_S)
-    caught_by, reported = _catcher(scene, chain)
+    caught_by, caught_s, reported = _catcher(scene, chain)
     return Story(
         cause=cause,
         found=found,
         caught_by=caught_by,
+        caught_s=caught_s,
         reported=reported,
         also=tuple(each for each in seen[1:] if each[0] not in (Cause.REPORTED, Cause.ORDERED_OFF)),
         chain=chain,
@@ -139,15 +148,15 @@ BEFORE_S: Final = 0.001
 """A cause and the event that shows it may have one time."""
 
 
-def _catcher(scene: Scene, chain: tuple[Event, ...]) -> tuple[str, str]:
-    """The first part that acted, and what it gave as its reason."""
+def _catcher(scene: Scene, chain: tuple[Event, ...]) -> tuple[str, float, str]:
+    """The first part that acted, when, and what it gave as its reason. A missing message is noticed before."""
     first = next((event for event in chain if event.level is Level.ALARM and event.kind in CATCHERS), None)
     if first is None:
-        return "", ""
+        return "", math.inf, ""
     is_driver = first.kind is EventKind.CONTROL and scene.is_canbase
     who = CATCHERS[EventKind.DRIVER if is_driver else first.kind]
     trips = (event.text for event in chain if event.kind is EventKind.TRIP and event.at_s <= first.at_s + SAYS_S)
-    return who, next(trips, first.text) if who == CATCHERS[EventKind.TRIP] else first.text
+    return who, first.at_s, next(trips, first.text) if who == CATCHERS[EventKind.TRIP] else first.text
 
 
 SAYS_S: Final = 0.1

@@ -122,18 +122,11 @@ class _Source:
         self._publishers: frozenset[str] = frozenset()
         self._delay = Delay(config.same_clock)
         self._late_from = math.inf
-        self._zero_from = math.inf
-        """Since when all commands have been zero, without a gap."""
-        self.yielding = False
 
     def accept_command(self, twist: Twist, received: float, sent: Sent | None, now_s: float) -> None:
         """A finite command."""
         self.received += 1
         self.refusal = ""
-        if not twist.is_zero:
-            self._zero_from = math.inf
-        elif self._zero_from == math.inf or not self.is_fresh(now_s):
-            self._zero_from = now_s
         self.command = Received(twist, received)
         self.delay_s = None if sent is None else self._delay.measure(sent)
         if sent is not None and self._delay.set_back:
@@ -171,13 +164,6 @@ class _Source:
 
     def is_fresh(self, now_s: float) -> bool:
         return self.fresh(now_s) is not None
-
-    def yields(self, now_s: float) -> bool:
-        """Rule 9."""
-        after_s = self.config.yields_after_zero_s
-        if after_s is None or now_s - self._zero_from < after_s:
-            return False
-        return self.is_fresh(now_s) and self.standing()[0] is SourceStanding.FOLLOWED
 
     def standing(self) -> tuple[SourceStanding, str]:
         """Of the one that has the base."""
@@ -299,9 +285,7 @@ class Mux:
         """The order at time `now_s` [s, monotonic]."""
         self._advance(now_s)
         held = {name: self._held_back(source, now_s) for name, source in self._sources.items()}
-        active = next(
-            (s for s in self._sources.values() if s.is_fresh(now_s) and not s.yielding and not held[s.name]), None
-        )
+        active = next((s for s in self._sources.values() if s.is_fresh(now_s) and not held[s.name]), None)
         views = tuple(self._view(source, active, held[source.name], now_s) for source in self._sources.values())
         if active is None:
             return MuxDecision(None, ZERO, views, *self._others(now_s))
@@ -326,17 +310,6 @@ class Mux:
                 source.arming.missed(now_s)
         self._looked_at = now_s
         self._arm(self._base.problem(now_s), now_s)
-        self._yield(now_s)
-
-    def _yield(self, now_s: float) -> None:
-        """Rule 9. Sources are in the order of their priorities."""
-        yielded = ""
-        for source in self._sources.values():
-            if yielded:
-                source.arming.yielded(yielded)
-            before, source.yielding = source.yielding, source.yields(now_s)
-            if source.yielding and not before:
-                yielded = f"{source.name} yielded the base"
 
     def _arm(self, not_ready: str, now_s: float) -> None:
         for source in self._sources.values():
@@ -367,9 +340,6 @@ class Mux:
             return source.view(now_s, SourceStanding.LOCKED, held, locked=True)
         if source.command.never:
             return source.view(now_s, SourceStanding.NEVER_RECEIVED, f"never received{refusal}")
-        if source.yielding:
-            reason = f"zero for {source.config.yields_after_zero_s:g} s: it yields"
-            return source.view(now_s, SourceStanding.LOWER_PRIORITY, reason)
         if active is None or not source.is_fresh(now_s):
             reason = f"no message for {age_s:.2f} s (timeout {source.config.timeout_s:.2f} s){refusal}"
             return source.view(now_s, SourceStanding.SILENT, reason)

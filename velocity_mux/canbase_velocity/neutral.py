@@ -13,8 +13,6 @@ Rules, for each source:
 6. A pause counts like 4 and 5 for whom only a zero arms: a lock held him back, or there was no usable scan for
    WITHOUT_SCANS_S. People walk up to a base that is at standstill. A program with `absent_s` goes on after a pause:
    docs/decisions/0029.
-7. When a source of higher priority yields (key yields_after_zero_s), each source whose last command orders motion is
-   disarmed, programs too: time alone starts no motion.
 """
 
 from __future__ import annotations
@@ -53,11 +51,6 @@ class Arming:
     def disarm(self, why: str) -> None:
         """It needs a zero again. The first reason is kept."""
         self.waits_since = self.waits_since or why
-
-    def yielded(self, why: str) -> None:
-        """A source of higher priority begins to yield. `why`: for people."""
-        if self._moves:
-            self.disarm(why)
 
     def advance(self, not_ready: str, now_s: float, *, silent: bool, paused: str = "") -> None:
         """Time has passed. `not_ready`: why the base cannot move; empty: it can. `silent`: it is not fresh.

@@ -10,8 +10,7 @@ Its drive works against a motion that does not exist, also with nothing ordered:
 
 LEAST_S after the encoder last moved it begins to count, and it must last for LEAST_S more: 606Ch may be filtered, and a
 wheel may meet something hard. A register that shows a few bits at standstill is no ghost, nor is a velocity that falls
-or changes its sign. Up to base.standstill_mps 606Ch may be noise, which keeps its sign by chance: it must not fall for
-LEAST_SAMPLES there (noise does so once in ten million samples, five samples once in a thousand).
+or changes its sign.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ LIVES = 2.0
 FROZEN_M, FROZEN_COUNTS = 0.0001, 4.0
 RESIDUE_BITS, FALLS_SHARE = 4.0, 0.99
 """A register that shows a few bits at standstill is no ghost, nor is a filter's tail: a velocity that stays is."""
-LEAST_S, LEAST_SAMPLES = 0.1, 12
+LEAST_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +43,14 @@ class _Scale:
 
     def __init__(self, moves_m: float, least_m: float, now_s: float) -> None:
         self._life, self._least_m = Life(moves_m), least_m
-        self._moved_at = now_s
-        self.begin()
+        self._moved_at, self._time_s, self.travel_m = now_s, 0.0, 0.0
 
-    def is_one(self, may_be_noise: bool) -> bool:
-        lasts = self._time_s >= LEAST_S and (self._samples >= LEAST_SAMPLES or not may_be_noise)
-        return lasts and abs(self.travel_m) >= self._least_m
+    @property
+    def is_one(self) -> bool:
+        return abs(self.travel_m) >= self._least_m and self._time_s >= LEAST_S
 
     def begin(self) -> None:
-        self._samples, self._time_s, self.travel_m = 0, 0.0, 0.0
+        self._time_s = self.travel_m = 0.0
 
     def on_sample(self, step_m: float | None, velocity_mps: float, elapsed_s: float, now_s: float) -> None:
         if step_m is None or self._life.on_step(step_m):
@@ -60,7 +58,6 @@ class _Scale:
         if now_s < self._moved_at + LEAST_S or velocity_mps == 0.0 or velocity_mps * self.travel_m < 0.0:
             self.begin()
             return
-        self._samples += elapsed_s > 0.0
         self._time_s += elapsed_s
         self.travel_m += velocity_mps * elapsed_s
 
@@ -75,7 +72,7 @@ class GhostWatch:
         self._frozen = _Scale(LIFE_COUNTS * count_m, frozen_m, now_s)
         self._jitters = _Scale(lives_m, LIVES * lives_m, now_s)
         self._residue_mps = RESIDUE_BITS * abs(drive.velocity_mps_per_bit)
-        self._standstill_mps, self._velocity_mps = config.standstill_mps, 0.0
+        self._velocity_mps = 0.0
 
     def trust(self) -> None:
         """A reset was accepted: everything starts again."""
@@ -95,8 +92,6 @@ class GhostWatch:
         counted_s = elapsed_s if powered and not falls else 0.0
         for scale in (self._frozen, self._jitters):
             scale.on_sample(step_m, shown_mps, counted_s, now_s)
-        may_be_noise = abs(velocity_mps) <= self._standstill_mps
         return Ghost(
-            max(self._frozen.travel_m, self._jitters.travel_m, key=abs),
-            self._frozen.is_one(may_be_noise) or self._jitters.is_one(may_be_noise),
+            max(self._frozen.travel_m, self._jitters.travel_m, key=abs), self._frozen.is_one or self._jitters.is_one
         )

@@ -197,7 +197,6 @@ def test_given_sources_replace_the_default_ones(tmp_path: Path) -> None:
         "mux.sources.pad.type", "mux.sources.pad.stamped", "mux.sources.pad.nodes", "mux.sources.pad.neutral_after_s",
         "mux.sources.pad.same_clock", "mux.locks", "mux.foreign_publishers", "mux.twist_mux",
         "mux.equal_priorities", "mux.twist_mux_timeout_s", "mux.twist_mux_rename",
-        "mux.sources.pad.yields_after_zero_s",
     }  # fmt: skip
 
 

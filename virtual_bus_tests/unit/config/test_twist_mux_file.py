@@ -282,9 +282,11 @@ def test_a_lock_without_timeout_is_refused(tmp_path: Path) -> None:
     )
 
 
-def test_two_nodes_with_topics_in_one_file_are_refused(tmp_path: Path) -> None:
-    text = refusal(tmp_path, TOPICS + TOPICS.replace("twist_mux:", "other_mux:"))
-    assert "mux0.yaml: has topics or locks of twist_mux and other_mux; keep those of one node" in text
+@pytest.mark.parametrize("node", ["other_mux", "/**/other", "/*/*", "twist*"])
+def test_topics_or_locks_of_a_node_that_is_not_this_one_are_refused(tmp_path: Path, node: str) -> None:
+    """A lock that nobody reads stops nothing."""
+    text = refusal(tmp_path, TOPICS, LOCKS.replace("twist_mux:", f"{node}:"))
+    assert f"of {node if node[0] == '/' else '/' + node}, which is not the node /twist_mux: keep those of one" in text
 
 
 def test_a_name_in_both_files_is_refused(tmp_path: Path) -> None:

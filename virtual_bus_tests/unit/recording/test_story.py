@@ -14,6 +14,7 @@ from canbase_campaign.twins import Twin
 from canbase_driver.runtime import black_box_notes as written
 from canbase_recording.cause import ADVICE, Cause, Found
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
+from canbase_recording.event import EventKind
 from canbase_recording.explanation import Explanation, explain
 from canbase_recording.story import RULES, Rule
 from canbase_velocity.twist import Twist
@@ -105,6 +106,15 @@ def test_a_consequence_is_not_the_cause() -> None:
     assert story.cause is Cause.DRIVER_SILENT
     assert any("EMCY 8130h" in event.text for event in story.chain)
     assert story.found.at_s < min(event.at_s for event in story.chain if "EMCY" in event.text)
+
+
+def test_a_part_acts_when_it_acts_and_not_when_a_missing_message_is_noticed() -> None:
+    """SYNC is missed after some of its periods; the watchdog that stops the drives for it acts later."""
+    (story,) = explained("motor_driver", "SIGSTOP", WIRE).stories
+    acted_s = next(event.at_s for event in story.chain if event.kind is EventKind.WATCHDOG)
+    assert story.caught_by == "watchdog"
+    assert story.caught_s == acted_s > story.scene.reaction_s
+    assert f", {1000.0 * (acted_s - story.found.at_s):.0f} ms later: " in story.caught
 
 
 def test_the_time_of_the_cause_is_that_of_the_last_frame_not_of_the_alarm() -> None:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from random import Random
 
 import pytest
 
-from canbase_watchdog.ghost import FROZEN_COUNTS, LEAST_SAMPLES, LIVES, Ghost, GhostWatch
+from canbase_watchdog.ghost import FROZEN_COUNTS, LIVES, Ghost, GhostWatch
 from support.evidence_wheel import CONFIG, HZ, Wheel
 
 COUNT_M = 2.0**-17
 """7.6 µm: a sign of life is 1 mm, a frozen encoder is found after 0.1 mm."""
 DRIVE = replace(CONFIG.drives[0], mps_per_bit=0.0, m_per_count=COUNT_M)
 LIFE_M = 0.001
-STILL = CONFIG.standstill_mps
 
 
 class Axis:
@@ -40,13 +38,11 @@ def jitter(n: int) -> float:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(
-    ("velocity", "samples"), [(0.25, 7), (STILL * 1.01, 7), (STILL, 12), (2.0**-9, 12), (2.0**-11, 14)]
-)
+@pytest.mark.parametrize(("velocity", "samples"), [(0.25, 7), (2.0**-9, 7), (2.0**-11, 14)])
 def test_a_frozen_encoder_is_found_after_a_tenth_of_a_second_or_of_a_millimetre(
     velocity: float, samples: int, sign: float
 ) -> None:
-    """7 samples are 0.11 s; up to base.standstill_mps there are 12; 14 at 0.49 mm/s are 0.107 mm."""
+    """7 samples are 0.11 s; 14 at 0.49 mm/s are 0.107 mm."""
     assert Axis().until_found(sign * velocity) == samples
 
 
@@ -71,7 +67,7 @@ def test_an_encoder_that_counts_is_no_ghost(counts: int) -> None:
 def test_one_increment_at_an_edge_is_no_motion() -> None:
     axis = Axis()
     axis.sample(0.0, COUNT_M)
-    assert axis.until_found(2.0**-9, lambda n: COUNT_M * (-1) ** n) == LEAST_SAMPLES
+    assert axis.until_found(2.0**-9, lambda n: COUNT_M * (-1) ** n) == 7
 
 
 @pytest.mark.parametrize("step_m", [None, 1.0])
@@ -88,13 +84,7 @@ def test_noise_to_both_sides_and_zeros_are_none() -> None:
     assert not axis.sample(0.0).is_one
 
 
-def test_noise_of_a_stationary_wheel_keeps_its_sign_by_chance_and_is_none() -> None:
-    """26 minutes with the whole noise that base.standstill_mps allows: 7 samples would do it every 4 minutes."""
-    axis, random = Axis(), Random(606)
-    assert not any(axis.sample(random.uniform(-STILL, STILL)).is_one for _ in range(100_000))
-
-
-@pytest.mark.parametrize(("share", "samples"), [(1.0, 1000), (1.01, LEAST_SAMPLES)])
+@pytest.mark.parametrize(("share", "samples"), [(1.0, 1000), (1.01, 7)])
 def test_four_bits_at_standstill_are_none(share: float, samples: int) -> None:
     axis = Axis(mps_per_bit=2.0**-11 / CONFIG.drives[0].velocity_scale)
     assert axis.until_found(share * 2.0**-9) == samples
