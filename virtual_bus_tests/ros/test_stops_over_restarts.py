@@ -9,11 +9,13 @@ from collections.abc import Iterator
 import pytest
 from canbase.msg import DriverStatus
 
-from support.running_robot import RESTS_M, RunningRobot, own_domain, robot_on
+from support.running_robot import PATIENT, RESTS_M, RunningRobot, own_domain, robot_on
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(200)]
 
 QUIET_S = 2.0
+STANDS_AFTER_S = PATIENT["timeouts"]["drive_heartbeat_s"] + 1.0
+"""With driver and watchdog killed, the drives stop by 1016h; then their ramp, and a loaded computer [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -23,14 +25,16 @@ def robot() -> Iterator[RunningRobot]:
         yield running
 
 
-def kill(robot: RunningRobot, *parts: str) -> None:
-    """All of them at once, then each is started again."""
+def kill(robot: RunningRobot, *parts: str) -> float:
+    """All of them at once, then each is started again; when they were killed (time.monotonic)."""
+    killed_s = time.monotonic()
     for part in parts:
         robot.send(part, signal.SIGKILL)
     for part in parts:
         assert robot.stack.end(part) == -signal.SIGKILL
     robot.status.clear()
     robot.stack.start()
+    return killed_s
 
 
 def stays_latched(robot: RunningRobot, cause: str) -> None:
@@ -44,11 +48,13 @@ def stays_latched(robot: RunningRobot, cause: str) -> None:
     robot.make_ready()
 
 
-# driving ── SIGKILL of driver and watchdog at once ── start: latched ── reset ── power
+# driving ── SIGKILL of driver and watchdog at once ── 1016h: standstill ── start: latched ── reset ── power
 def test_driver_and_watchdog_killed_with_power_come_back_latched(robot: RunningRobot) -> None:
     robot.goal(4.0, 0.3)
     robot.wait_speed(0.29)
-    kill(robot, "driver", "watchdog")
+    killed_s = kill(robot, "driver", "watchdog")
+    robot.wait_standing()
+    assert robot.standstill_after(killed_s).after_s < STANDS_AFTER_S
     stays_latched(robot, "it ended while there was power")
 
 
