@@ -64,7 +64,7 @@ endif
 nightly: $(VENV)/ready ## seeds of today that never ran: campaign, lies, odd drives, ordinary driving, Hypothesis; DATE=2026-12-01 repeats a night, SHARE=0.1 a part of it
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.nightly $(if $(DATE),--date $(DATE)) $(if $(SHARE),--share $(SHARE)) $(if $(ONLY),--only $(ONLY))
 
-HOT_SOURCES := $(wildcard can_config/canbase_config/*.py runtime/canbase_runtime/*.py driver/canbase_driver/*.py \
+HOT_SOURCES := $(wildcard can_config/canbase_config/*.py runtime/*/*.py driver/canbase_driver/*.py \
   driver/canbase_driver/*/*.py velocity_mux/canbase_velocity/*.py \
   watchdog/canbase_watchdog/*.py action_server/canbase_action_server/*.py virtual_bus_tests/canbase_sim/*.py \
   virtual_bus_tests/canbase_sim/*/*.py virtual_bus_tests/canbase_campaign/*.py virtual_bus_tests/compiled/*.py)

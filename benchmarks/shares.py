@@ -30,7 +30,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
-from canbase_driver.runtime.frame_socket import open_bus
+from canbase_base.frame_socket import open_bus
 arguments = json.loads(sys.argv[1])
 bus, elsewhere = open_bus(arguments), open_bus(arguments | {"port": int(sys.argv[2])})
 rclpy.init()

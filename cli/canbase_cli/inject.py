@@ -68,8 +68,8 @@ def inject(
 
 
 def _signal(robot: Robot, part: str, fault: str) -> None:
+    from canbase_base.single_instance import bus_name, holder
     from canbase_runtime.own_process import NotOursError, send_signal
-    from canbase_runtime.single_instance import bus_name, holder
 
     if fault not in SIGNALS:
         fail(f"{part} takes {', '.join(SIGNALS)}, not {fault!r}", WRONG_INPUT)

@@ -13,8 +13,8 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from canbase_base.single_instance import bus_name, holder
 from canbase_doctor.check import Check, fail, ok
-from canbase_runtime.single_instance import bus_name, holder
 
 if TYPE_CHECKING:
     from canbase_config.load import Loaded

@@ -71,11 +71,11 @@ def _reports_when_ready(namespace: str, ros_args: list[str]) -> Iterator[None]:
 
 def _refuse_twice(robot: Robot) -> None:
     """Before any part starts: one that runs already is left alone."""
-    from canbase_runtime.latch_file import WRITER, latch_folder, record_name
-    from canbase_runtime.single_instance import TakenError, bus_name, check
+    from canbase_base.latch_folder import SUFFIX, latch_folder
+    from canbase_base.single_instance import WRITER, TakenError, bus_name, check, record_name
 
     bus = bus_name(robot.bus.arguments())
-    record = record_name(latch_folder(os.environ, Path.home(), robot.name), "driver")
+    record = record_name(latch_folder(os.environ, Path.home(), robot.name) / f"driver{SUFFIX}")
     held = ("driver", bus), ("watchdog", bus), ("velocity process", robot.lease.socket), (WRITER, record)
     try:
         for task, name in held:

@@ -22,13 +22,13 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from canbase_base.own_folder import replaced
 from canbase_doctor import bundle_contents as support
 from canbase_doctor.bounded_run import run
 from canbase_doctor.bundle_filter import LINES, Filter, environment, journal_text, matching, names_of
 from canbase_doctor.bundle_words import Words, own_words
 from canbase_doctor.careful_read import RefusedError, modified, names, read_end
 from canbase_doctor.service_environment import service_environment
-from canbase_runtime.own_folder import replaced
 from canbase_runtime.terminal import FAILED, colour, fail
 from canbase_runtime.which_robot import ETC, NoRobotError, which_robot
 
@@ -214,7 +214,7 @@ def _black_boxes(bundle: Bundle, robot: Robot | None, state: Path) -> None:
 
 def _records(bundle: Bundle, robot: str, state: Path) -> None:
     """What the parts have on disk about their stops, in words: the files name the computer by a number of its own."""
-    from canbase_runtime.latch_file import SUFFIX, latch_folder
+    from canbase_base.latch_folder import SUFFIX, latch_folder
 
     folders = {"installed": state / robot, "user": latch_folder(os.environ, Path.home(), robot)}
     places = {
@@ -232,8 +232,8 @@ def _shown(paths: Iterable[Path]) -> str:
 
 
 def _record_text(path: Path, robot: str, words: Words) -> str:
+    from canbase_base.latch_folder import machine
     from canbase_runtime import latch_record
-    from canbase_runtime.latch_file import machine
 
     _, content = read_end(path, latch_record.SIZE + 1)
     found = latch_record.read(content, latch_record.owner_of(path.stem, robot, machine()))

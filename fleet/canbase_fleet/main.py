@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
+from canbase_base.sd_notify import Service
 from canbase_config.robot import Robot
 from canbase_fleet.exposition import Exposition
 from canbase_fleet.http_server import Page, PageServer
 from canbase_fleet.robot_topics import POLL_S, RobotTopics, end_signals, utc_now
 from canbase_fleet.vda5050 import line, state
 from canbase_runtime.private_process import guard_keys
-from canbase_runtime.sd_notify import Service
 from canbase_runtime.version import installed_version
 from canbase_runtime.web_names import authority
 

@@ -13,6 +13,7 @@ from canbase_runtime.version import is_compiled
 
 PACKAGES: Final = (
     "canbase_config",
+    "canbase_base",
     "canbase_runtime",
     "canbase_driver",
     "canbase_velocity",

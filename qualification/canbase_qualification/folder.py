@@ -11,9 +11,9 @@ from typing import Final
 
 from pydantic import TypeAdapter
 
+from canbase_base.own_folder import replaced
 from canbase_qualification.job import Amount, Load
 from canbase_qualification.software import Software
-from canbase_runtime.own_folder import replaced
 
 NAME: Final = "qualification.json"
 ROBOT: Final = "robot.yaml"

@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
+from canbase_base.own_folder import replaced
 from canbase_config.effective import effective
 from canbase_config.fingerprint import configuration_sha256
 from canbase_config.load import Loaded
@@ -26,7 +27,6 @@ from canbase_qualification.report_json import as_json
 from canbase_qualification.report_markdown import markdown
 from canbase_qualification.report_sections import sections
 from canbase_qualification.simulated_robot import simulated
-from canbase_runtime.own_folder import replaced
 
 PAGE, MARKDOWN, JSON = "report.html", "report.md", "report.json"
 LIBRARIES: Final = ("canopen", "pydantic", "python-can")

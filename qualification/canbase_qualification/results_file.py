@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Final
 
+from canbase_base.own_folder import replaced
 from canbase_qualification.outcome import BrokenLineError, Outcome
-from canbase_runtime.own_folder import replaced
 
 NAME: Final = "results.jsonl"
 

@@ -15,8 +15,8 @@ from typing import Final
 from canbase_runtime.version import installed_version
 
 COMPUTES: Final = (
-    "canbase_config", "canbase_runtime", "canbase_driver", "canbase_velocity", "canbase_watchdog",
-    "canbase_action_server", "canbase_sim", "canbase_campaign",
+    "canbase_config", "canbase_base", "canbase_runtime", "canbase_driver", "canbase_velocity",
+    "canbase_watchdog", "canbase_action_server", "canbase_sim", "canbase_campaign",
 )  # fmt: skip
 """Packages whose sources decide what comes out,"""
 OURS: Final = ("driving.py", "job.py", "outcome.py", "runs.py", "simulated_robot.py")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from canbase_runtime.own_folder import replaced
+from canbase_base.own_folder import replaced
 
 WAITING: Final = 4
 LINES_AT_ONCE: Final = 5

@@ -10,64 +10,19 @@ import errno
 import os
 import queue
 import shutil
-import socket
-import stat
 import threading
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from canbase_base.latch_folder import PARTS, SUFFIX, forgetful, machine, wrong_access
+from canbase_base.own_folder import FolderError, open_own_folder, replaced
 from canbase_runtime import latch_record
-from canbase_runtime import single_instance as sole
-from canbase_runtime.lasting import forgets
 from canbase_runtime.latch_record import Defect, Found, Record
-from canbase_runtime.own_folder import FolderError, open_own_folder, replaced
 
-PARTS: Final = ("driver", "watchdog", "velocity")
-SUFFIX: Final = ".latch"
-WRITER: Final = "writer of records"
-"""What is held while a process writes one, beside `sole`'s other tasks."""
 MOUNT: Final = "mount a folder of a disk there: a volume, for a container"
 RETRY_S: Final = 1.0
-_MACHINE: Final = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
 _OPEN: Final = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-_OTHERS: Final = stat.S_IWGRP | stat.S_IWOTH
-
-
-def latch_folder(environment: Mapping[str, str], home: Path, robot: str) -> Path:
-    """Where the records of this robot are: the last of what systemd gives (StateDirectory=), else by the robot's name
-    in the user's state folder."""
-    given = environment.get("STATE_DIRECTORY", "").split(":")
-    if len(given) > 1:
-        return Path(given[-1])
-    state = Path(given[0]) if given[0] else _state_home(environment, home) / "canbase"
-    return state / robot
-
-
-def hold(folder: Path, part: str) -> socket.socket:
-    """Be the only one that writes the record of `part`, until it is closed or the process ends.
-
-    Raises sole.TakenError with the holder: two robots of one name would forget each other's latched stops.
-    """
-    try:
-        return sole.take(WRITER, record_name(folder, part))
-    except sole.TakenError as error:
-        raise sole.TakenError(f"{error}. Two robots on one computer need two names (`name` in robot.yaml)") from error
-
-
-def record_name(folder: Path, part: str) -> str:
-    """What `hold` holds."""
-    return str(folder.resolve() / f"{part}{SUFFIX}")
-
-
-def machine() -> str:
-    """What identifies this computer: its machine-id, and the serial number of a board that has one."""
-    found = []
-    for path in _MACHINE:
-        with contextlib.suppress(OSError):
-            found.append(path.read_bytes().rstrip(b"\0\n").decode(errors="replace"))
-    return " ".join(found)
 
 
 def create_first(folder: Path, robot: str) -> bool:
@@ -115,7 +70,7 @@ class LatchFile:
             found = Found(defect=Defect.ACCESS, detail=str(error))
         except OSError as error:
             found = Found(defect=Defect.UNREADABLE, detail=f"{self.path}: {error.strerror or error}")
-        if self._must_last and found.says_nothing and (kind := _forgets(self.path)):
+        if self._must_last and found.says_nothing and (kind := forgetful(self.path)):
             found = Found(defect=Defect.FORGETS, detail=f"{self.path.parent} is on {kind}; {MOUNT}")
         self._sequence = found.sequence
         if found.defect is not Defect.NONE:
@@ -143,14 +98,16 @@ class LatchFile:
         writable, folder = True, open_own_folder(self.path.parent)
         try:
             self._descriptor = os.open(self.path.name, os.O_RDWR | _OPEN, dir_fd=folder)
+            wrong = wrong_access(self._descriptor, folder, self.path)
         except OSError as error:
             if error.errno != errno.EROFS:
                 raise
             writable = False
             self._descriptor = os.open(self.path.name, os.O_RDONLY | _OPEN, dir_fd=folder)
+            wrong = wrong_access(self._descriptor, folder, self.path)
         finally:
             os.close(folder)
-        if wrong := _wrong_access(self._descriptor, self.path):
+        if wrong:
             return Found(defect=Defect.ACCESS, detail=wrong)
         found = latch_record.read(os.pread(self._descriptor, latch_record.SIZE + 1, 0), self._owner)
         if not writable:
@@ -166,14 +123,6 @@ class LatchFile:
         with replaced(self.path, private=True) as file:
             file.write(latch_record.whole(record, self._owner))
         self._descriptor, self._sequence = os.open(self.path, os.O_RDWR | _OPEN), 2
-
-
-def _forgets(path: Path) -> str:
-    try:
-        mounts = Path("/proc/self/mountinfo").read_text("utf-8", "replace")
-    except OSError:
-        mounts = ""
-    return forgets(os.path.realpath(path.parent), mounts)
 
 
 class LatchKeeper(threading.Thread):
@@ -246,21 +195,3 @@ class LatchKeeper(threading.Thread):
             return False
         self.written, self.problem = record, ""
         return True
-
-
-def _state_home(environment: Mapping[str, str], home: Path) -> Path:
-    return Path(environment.get("XDG_STATE_HOME") or home / ".local" / "state")
-
-
-def _wrong_access(descriptor: int, path: Path) -> str:
-    """Users besides root who could change it; empty: none."""
-    file, folder, me = os.fstat(descriptor), path.parent.stat(), os.geteuid()
-    if not stat.S_ISREG(file.st_mode):
-        return f"{path} is no regular file"
-    if file.st_uid != me:
-        return f"{path} belongs to user {file.st_uid}, this is user {me}"
-    if folder.st_uid not in (0, me):
-        return f"{path.parent} belongs to user {folder.st_uid}, this is user {me}"
-    if (file.st_mode | folder.st_mode) & _OTHERS:
-        return f"others than user {me} may write {path} or its folder"
-    return ""

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from canbase_base.single_instance import holder_at
 from canbase_runtime import own_process
-from canbase_runtime.single_instance import holder_at
 
 VARIABLE: Final = "CANBASE_ROBOT"
 ETC: Final = Path("/etc/canbase")

@@ -17,13 +17,14 @@ from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_base.latch_folder import SUFFIX, latch_folder
+from canbase_base.sd_notify import Service
+from canbase_base.single_instance import TakenError, hold_record, take
 from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
-from canbase_runtime.latch_file import LatchFile, LatchKeeper, hold, latch_folder
+from canbase_runtime.latch_file import LatchFile, LatchKeeper
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
-from canbase_runtime.sd_notify import Service
-from canbase_runtime.single_instance import TakenError, take
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.input_ring import InputRing
 from canbase_velocity.mux_node import MuxNode
@@ -48,7 +49,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
     never_wait(os.environ)
     folder = latch_folder(os.environ, Path.home(), robot.name)
     try:
-        held, writer = take("velocity process", robot.lease.socket), hold(folder, "velocity")
+        held, writer = take("velocity process", robot.lease.socket), hold_record(folder / f"velocity{SUFFIX}")
     except TakenError as error:
         print(f"canbase serve velocity: {error}", file=sys.stderr)
         return 1

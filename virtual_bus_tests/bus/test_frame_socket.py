@@ -1,27 +1,23 @@
-"""Frames read and written at the socket of a bus, in both copies, beside python-can on the same bus."""
+"""Frames read and written at the socket of a bus, beside python-can on the same bus."""
 
 from __future__ import annotations
 
-import inspect
 import itertools
 import random
 import socket
 import struct
 import time
 from collections.abc import Iterator
-from types import ModuleType
 from typing import Any
 
 import can
 import pytest
 from can.interfaces.udp_multicast import utils
 
-from canbase_driver.runtime import frame_socket as of_the_driver
-from canbase_watchdog import frame_socket as of_the_watchdog
+from canbase_base import frame_socket
 from support.udp_port import free_udp_port
 
 pytestmark = pytest.mark.bus
-COPIES = pytest.mark.parametrize("module", [of_the_driver, of_the_watchdog], ids=["driver", "watchdog"])
 FRAME = struct.Struct("=IB3x8s")
 """linux/can.h, struct can_frame."""
 PLAIN = {
@@ -62,6 +58,13 @@ def send(bus: Any, fields: dict[str, Any]) -> None:
     bus._multicast.send(packer.msgpack.packb(fields), 1.0)
 
 
+def read(bus: frame_socket.FrameSocket) -> frame_socket.Received:
+    """The next frame, which comes within a second."""
+    received = bus.read(1.0)
+    assert received is not None
+    return received
+
+
 @pytest.fixture
 def udp() -> dict[str, Any]:
     return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": free_udp_port(), "hop_limit": 0}
@@ -75,9 +78,9 @@ def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
         yield one, other
 
 
-def socketcan(module: ModuleType, end: socket.socket, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr(module.can, "Bus", lambda **_: SocketBus(end))
-    return module.open_bus({"interface": "socketcan", "channel": "can0"})
+def socketcan(end: socket.socket, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(can, "Bus", lambda **_: SocketBus(end))
+    return frame_socket.open_bus({"interface": "socketcan", "channel": "can0"})
 
 
 def drawn(rng: random.Random) -> can.Message:
@@ -98,40 +101,29 @@ def drawn(rng: random.Random) -> can.Message:
     )
 
 
-def test_the_watchdogs_copy_does_the_same() -> None:
-    def code(module: ModuleType) -> str:
-        return "\n".join(
-            line for line in inspect.getsource(module).split('"""', 2)[2].splitlines() if "local_frames" not in line
-        )
-
-    assert code(of_the_watchdog) == code(of_the_driver)
-
-
-@COPIES
-def test_each_frame_on_the_simulated_bus_is_what_python_can_says_of_it(module: ModuleType, udp: dict[str, Any]) -> None:
+def test_each_frame_on_the_simulated_bus_is_what_python_can_says_of_it(udp: dict[str, Any]) -> None:
     rng = random.Random(7)
-    reader, sender = module.open_bus(udp), can.Bus(**udp)
+    reader, sender = frame_socket.open_bus(udp), can.Bus(**udp)
     with can.Bus(**udp) as library:
         for _ in range(MANY):
             sender.send(drawn(rng))
-            said, received = library.recv(1.0), reader.read(1.0)
+            said, received = library.recv(1.0), read(reader)
             assert said is not None
             can_id, data, at_s = received
-            assert (can_id <= module.MAX_COB_ID) == (
+            assert (can_id <= frame_socket.MAX_COB_ID) == (
                 not (said.is_extended_id or said.is_remote_frame or said.is_error_frame or said.is_fd)
             )
-            assert can_id & module.ERROR_CLASS == said.arbitration_id
-            assert bool(can_id & module.EXTENDED) == said.is_extended_id
-            assert bool(can_id & module.REMOTE) == said.is_remote_frame
-            assert bool(can_id & module.ERROR) == said.is_error_frame
-            assert bool(can_id & module.FLEXIBLE) == said.is_fd
+            assert can_id & frame_socket.ERROR_CLASS == said.arbitration_id
+            assert bool(can_id & frame_socket.EXTENDED) == said.is_extended_id
+            assert bool(can_id & frame_socket.REMOTE) == said.is_remote_frame
+            assert bool(can_id & frame_socket.ERROR) == said.is_error_frame
+            assert bool(can_id & frame_socket.FLEXIBLE) == said.is_fd
             assert data == bytes(said.data)
             assert at_s == pytest.approx(said.timestamp, abs=0.05)  # of two sockets
     reader.close()
     sender.shutdown()
 
 
-@COPIES
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -145,38 +137,34 @@ def test_each_frame_on_the_simulated_bus_is_what_python_can_says_of_it(module: M
     ],
     ids=str,
 )
-def test_a_datagram_that_is_no_frame_for_python_can_is_none_here(
-    module: ModuleType, udp: dict[str, Any], wrong: dict[str, Any]
-) -> None:
-    reader, sender = module.open_bus(udp), can.Bus(**udp)
+def test_a_datagram_that_is_no_frame_for_python_can_is_none_here(udp: dict[str, Any], wrong: dict[str, Any]) -> None:
+    reader, sender = frame_socket.open_bus(udp), can.Bus(**udp)
     with can.Bus(**udp) as library:
         send(sender, PLAIN | wrong)
         with pytest.raises(can.CanOperationError):
             library.recv(1.0)
-        assert reader.read(1.0)[0] == module.NO_FRAME
+        assert read(reader)[0] == frame_socket.NO_FRAME
         send(sender, PLAIN)
-        assert reader.read(1.0)[:2] == (0x181, bytes(8))
+        assert read(reader)[:2] == (0x181, bytes(8))
     reader.close()
     sender.shutdown()
 
 
-@COPIES
 def test_a_number_in_the_place_of_the_data_takes_no_memory(
-    module: ModuleType, udp: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    udp: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reader, sender = module.open_bus(udp), can.Bus(**udp)
+    reader, sender = frame_socket.open_bus(udp), can.Bus(**udp)
     send(sender, PLAIN | {"data": 2**31})
     made: list[dict[str, Any]] = []
-    monkeypatch.setattr(module.can, "Message", lambda **fields: made.append(fields))
-    assert reader.read(1.0)[0] == module.NO_FRAME
+    monkeypatch.setattr(can, "Message", lambda **fields: made.append(fields))
+    assert read(reader)[0] == frame_socket.NO_FRAME
     assert made == []
     reader.close()
     sender.shutdown()
 
 
-@COPIES
-def test_what_it_writes_is_a_frame_for_python_can(module: ModuleType, udp: dict[str, Any]) -> None:
-    writer = module.open_bus(udp)
+def test_what_it_writes_is_a_frame_for_python_can(udp: dict[str, Any]) -> None:
+    writer = frame_socket.open_bus(udp)
     with can.Bus(**udp) as library:
         for length in range(9):
             writer.write(0x181 + length, bytes(range(length)), 0.1)
@@ -187,35 +175,38 @@ def test_what_it_writes_is_a_frame_for_python_can(module: ModuleType, udp: dict[
     writer.close()
 
 
-@COPIES
-def test_what_it_requests_is_a_remote_frame_for_python_can(module: ModuleType, udp: dict[str, Any]) -> None:
-    writer = module.open_bus(udp)
+def test_what_it_requests_is_a_remote_frame_for_python_can(udp: dict[str, Any]) -> None:
+    writer = frame_socket.open_bus(udp)
     with can.Bus(**udp) as library:
         writer.request(0x701, 1, 0.1)
         said = library.recv(1.0)
         assert said is not None
         assert (said.arbitration_id, said.dlc, said.is_remote_frame, said.is_extended_id) == (0x701, 1, True, False)
         assert bytes(said.data) == b""
-    assert writer.read(1.0)[:2] == (module.REMOTE | 0x701, b"")  # each sender hears itself
+    assert read(writer)[:2] == (frame_socket.REMOTE | 0x701, b"")  # each sender hears itself
     writer.close()
 
 
-@COPIES
 def test_a_request_on_socketcan_has_the_flag_and_the_length_of_the_answer(
-    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = socketcan(module, ends[0], monkeypatch)
+    bus = socketcan(ends[0], monkeypatch)
     bus.request(0x705, 1, 0.1)
-    assert FRAME.unpack(ends[1].recv(100)) == (module.REMOTE | 0x705, 1, bytes(8))
+    assert FRAME.unpack(ends[1].recv(100)) == (frame_socket.REMOTE | 0x705, 1, bytes(8))
 
 
-@COPIES
 def test_a_socketcan_frame_has_its_flags_its_length_and_the_time_of_the_kernel(
-    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = socketcan(module, ends[0], monkeypatch)
+    bus = socketcan(ends[0], monkeypatch)
     before_s = time.time()
-    for can_id in (0x181, 0x7FF, module.EXTENDED | 0x181, module.REMOTE | 0x181, module.ERROR | 0x040):
+    for can_id in (
+        0x181,
+        0x7FF,
+        frame_socket.EXTENDED | 0x181,
+        frame_socket.REMOTE | 0x181,
+        frame_socket.ERROR | 0x040,
+    ):
         for length in range(9):
             ends[1].send(FRAME.pack(can_id, length, bytes(range(8))))
             seen = bus.read(0.0)
@@ -223,24 +214,22 @@ def test_a_socketcan_frame_has_its_flags_its_length_and_the_time_of_the_kernel(
             assert seen[:2] == (can_id, bytes(range(length)))
             assert before_s <= seen[2] <= time.time()
     ends[1].send(bytes(72))  # CAN FD
-    assert bus.read(0.0)[0] > module.MAX_COB_ID
+    assert bus.read(0.0)[0] > frame_socket.MAX_COB_ID
     assert bus.read(0.0) is None
 
 
-@COPIES
 def test_a_socketcan_frame_is_written_as_the_kernel_wants_it(
-    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = socketcan(module, ends[0], monkeypatch)
+    bus = socketcan(ends[0], monkeypatch)
     bus.write(0x201, b"\x0f\x00\x10", 0.0)
     assert ends[1].recv(100) == FRAME.pack(0x201, 3, b"\x0f\x00\x10")
 
 
-@COPIES
 def test_a_full_buffer_is_an_error_after_the_timeout_and_nothing_is_sent_later(
-    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = socketcan(module, ends[0], monkeypatch)
+    bus = socketcan(ends[0], monkeypatch)
     sent = itertools.count()
 
     def write_until_it_fails() -> None:
@@ -257,11 +246,10 @@ def test_a_full_buffer_is_an_error_after_the_timeout_and_nothing_is_sent_later(
         ends[1].recv(100, socket.MSG_DONTWAIT)
 
 
-@COPIES
 def test_waiting_ends_with_the_frame_or_with_the_time(
-    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = socketcan(module, ends[0], monkeypatch)
+    bus = socketcan(ends[0], monkeypatch)
     began = time.monotonic()
     assert bus.read(0.05) is None
     assert time.monotonic() - began >= 0.05
@@ -271,11 +259,10 @@ def test_waiting_ends_with_the_frame_or_with_the_time(
     assert time.monotonic() - began < 5.0
 
 
-@COPIES
 def test_a_bus_that_is_gone_raises_and_a_closed_one_is_closed(
-    module: ModuleType, ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
+    ends: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bus = socketcan(module, ends[0], monkeypatch)
+    bus = socketcan(ends[0], monkeypatch)
     ends[1].close()
     with pytest.raises(OSError, match="refused"):
         bus.write(0x201, b"", 0.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import shutil
@@ -13,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from canbase_runtime import local_frames as of_the_others
-from canbase_watchdog import local_frames as of_the_watchdog
+from canbase_base.local_frames import keep_to_this_computer
 from support.receivers import INSIDE
 
 pytestmark = pytest.mark.bus
@@ -88,12 +86,6 @@ def test_a_bus_that_is_to_span_computers_hears_them(two_computers: None) -> None
     assert all(OUTSIDE in frames and INSIDE.arbitration_id in frames for frames in list(told.values())[:3]), told
 
 
-def test_the_watchdogs_copy_does_the_same() -> None:
-    ours, copy = (inspect.getsource(module).split('"""', 2)[2] for module in (of_the_others, of_the_watchdog))
-
-    assert copy == ours
-
-
 class NoSocket:
     """As python-can's `virtual` bus."""
 
@@ -103,4 +95,4 @@ class NoSocket:
 
 @pytest.mark.parametrize("arguments", [{"interface": "virtual"}, {"interface": "socketcan", "hop_limit": 0}])
 def test_other_buses_get_no_filter(arguments: dict[str, object]) -> None:
-    of_the_others.keep_to_this_computer(arguments, NoSocket())
+    keep_to_this_computer(arguments, NoSocket())

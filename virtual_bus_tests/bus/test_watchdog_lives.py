@@ -19,6 +19,7 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 
+from canbase_base.single_instance import TakenError
 from canbase_runtime.latch_file import create_first
 from canbase_watchdog import bus_port as watchdog_bus_port
 from canbase_watchdog import frames, life, loop, main, realtime
@@ -29,7 +30,6 @@ from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.observer import Observer
-from canbase_watchdog.single_instance import TakenError
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.flaky_bus import FlakyBus

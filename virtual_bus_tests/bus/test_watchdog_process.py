@@ -158,8 +158,8 @@ def test_a_second_watchdog_on_the_same_bus_leaves_the_first_alone(watched: Watch
 def test_a_watchdog_that_hears_another_one_never_sends(watched: Watched) -> None:
     """On another computer the name of the first one is not taken: here it is left out."""
     code = (
-        "import sys; from canbase_watchdog import main, single_instance; "
-        "single_instance.hold_bus = single_instance.hold_record = lambda _: open('/dev/null'); "
+        "import sys; from canbase_base import single_instance; from canbase_watchdog import main; "
+        "single_instance.take = lambda *_: open('/dev/null'); "
         "sys.exit(main.main(sys.argv[1:]))"
     )
     other = replace(watched.config, lease_socket=f"{watched.config.lease_socket}2")
@@ -197,7 +197,7 @@ def test_without_a_configuration_it_is_2() -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_the_process_loads_nothing_but_the_standard_library_python_can_and_the_dataclass() -> None:
+def test_the_process_loads_nothing_but_the_standard_library_python_can_its_base_and_the_dataclass() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", "import sys, canbase_watchdog.main; print(*sys.modules)"],
         capture_output=True,
@@ -205,7 +205,8 @@ def test_the_process_loads_nothing_but_the_standard_library_python_can_and_the_d
         check=True,
         env=os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
     ).stdout.split()
-    ours = {name for name in loaded if name.startswith("canbase") and not name.startswith("canbase_watchdog")}
+    own = ("canbase_watchdog", "canbase_base")
+    ours = {name for name in loaded if name.startswith("canbase") and not name.startswith(own)}
     assert ours == {"canbase_config", "canbase_config.watchdog"}
     packages = {name.partition(".")[0] for name in loaded}
     assert "can" in packages

@@ -14,9 +14,9 @@ from typing import Any
 import can
 import pytest
 
+from canbase_base.single_instance import bus_name, take
 from canbase_config.load import load_robot
 from canbase_config.watchdog import WatchdogConfig, WatchedLayout
-from canbase_runtime.single_instance import bus_name, take
 from canbase_watchdog.post_stop import LIMIT_S, main, plan
 from support.bus_tool import write_robot
 from support.udp_port import free_udp_port

@@ -9,9 +9,9 @@ from contextlib import ExitStack
 
 import can
 
+from canbase_base.local_frames import keep_to_this_computer
 from canbase_config.bit_rate import BIT_RATES, bus_at
 from canbase_config.robot import Bus
-from canbase_runtime.local_frames import keep_to_this_computer
 
 POLL_S = 0.0005
 """Between two looks at buses that cannot be waited for (`virtual`)."""

@@ -12,9 +12,9 @@ from functools import partial
 
 import can
 
+from canbase_base.local_frames import keep_to_this_computer
 from canbase_config.load import load_robot, sample
 from canbase_driver.runtime import bus_port as of_the_driver
-from canbase_runtime.local_frames import keep_to_this_computer
 from canbase_watchdog import bus_port as of_the_watchdog
 
 INSIDE = can.Message(arbitration_id=0x181, data=b"\1", is_extended_id=False)

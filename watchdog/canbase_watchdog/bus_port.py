@@ -10,9 +10,9 @@ from typing import Any
 
 import can
 
+from canbase_base.carrier import is_without_carrier
+from canbase_base.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, Received, open_bus
 from canbase_watchdog.bus_health import BusHealth
-from canbase_watchdog.carrier import is_without_carrier
-from canbase_watchdog.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, Received, open_bus
 from canbase_watchdog.frames import Frame
 
 SEND_TIMEOUT_S = 0.001

@@ -9,45 +9,19 @@ import contextlib
 import errno
 import os
 import queue
-import re
-import stat
 import threading
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from canbase_base.latch_folder import forgetful, machine, wrong_access
+from canbase_base.own_folder import open_own_folder, replaced
 from canbase_watchdog import latch
 from canbase_watchdog.latch import Entry, Past
-from canbase_watchdog.own_folder import open_own_folder, replaced
 
 RETRY_S = 1.0
 STACK_BYTES = 512 * 1024
 """Of the keeper's stack. The watchdog locks its memory (`realtime.py`), so all of it is resident: 8 MB by default."""
-_MACHINE = (Path("/etc/machine-id"), Path("/sys/firmware/devicetree/base/serial-number"))
-_LASTS = (
-    "9p", "btrfs", "cifs", "ext2", "ext3", "ext4", "f2fs", "jffs2", "nfs", "nfs4", "ubifs", "vfat", "virtiofs", "xfs",
-    "zfs",
-)  # fmt: skip
-"""Types of file systems on disks, flash memory and other computers; what is not known may be in memory."""
 _FLAGS = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-
-
-def path_of(environment: Mapping[str, str], home: Path, robot: str) -> Path:
-    """The last folder that systemd gives (StateDirectory=), else by the robot's name in the user's state folder."""
-    given = environment.get("STATE_DIRECTORY", "").split(":")
-    state = Path(environment.get("XDG_STATE_HOME") or home / ".local" / "state") / "canbase"
-    if given[0]:
-        state = Path(given[-1])
-    return (state if len(given) > 1 else state / robot) / "watchdog.latch"
-
-
-def machine() -> str:
-    """Machine-id, and the serial number of a board that has one."""
-    found = []
-    for path in _MACHINE:
-        with contextlib.suppress(OSError):
-            found.append(path.read_bytes().rstrip(b"\0\n").decode(errors="replace"))
-    return " ".join(found)
 
 
 class Keeper(threading.Thread):
@@ -59,7 +33,7 @@ class Keeper(threading.Thread):
         self._path, self._whose = path, latch.owner(robot, machine())
         self._descriptor: int | None = None
         self.past = self._read()
-        if must_last and not self.past.latched and (kind := _forgets(path)):
+        if must_last and not self.past.latched and (kind := forgetful(path)):
             problem = f"{path.parent} is on {kind}, which a reboot empties; mount a folder of a disk there"
             self.past = replace(self.past, problem=problem)
         self._sequence = self.past.sequence
@@ -169,7 +143,7 @@ class Keeper(threading.Thread):
                 raise
         descriptor = os.open(self._path.name, os.O_RDONLY | _FLAGS, dir_fd=folder)
         try:
-            problem = _access(descriptor, folder)
+            problem = wrong_access(descriptor, folder, self._path)
             return Past(problem=problem) if problem else latch.decode(os.read(descriptor, 16384), self._whose)
         finally:
             os.close(descriptor)
@@ -178,38 +152,3 @@ class Keeper(threading.Thread):
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
-
-
-def _forgets(path: Path) -> str:
-    """The file system, by the kernel's table of mounts, that is not known to last over a reboot; empty: it lasts."""
-    try:
-        mounts = Path("/proc/self/mountinfo").read_text("utf-8", "replace")
-    except OSError:
-        mounts = ""
-    kind, device = _file_system(os.path.realpath(path.parent), mounts)
-    if device.startswith(("/dev/ram", "/dev/zram")):
-        return f"{kind} in memory ({device})"
-    return "" if kind in _LASTS else kind
-
-
-def _file_system(folder: str, mountinfo: str) -> tuple[str, str]:
-    """Type and device of the longest mount point above: 36 35 98:0 / /point rw shared:1 - ext4 /dev/sda1 rw."""
-    longest, found = -1, ("an unknown file system", "")
-    for words in (line.split() for line in mountinfo.splitlines()):
-        point = re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), words[4]).rstrip("/")
-        if len(point) >= longest and f"{folder}/".startswith(f"{point}/"):
-            after = words.index("-")
-            longest, found = len(point), (words[after + 1], words[after + 2])
-    return found
-
-
-def _access(descriptor: int, folder: int) -> str:
-    """Users besides root who could change it; empty: none."""
-    file, parent, me = os.fstat(descriptor), os.fstat(folder), os.geteuid()
-    if not stat.S_ISREG(file.st_mode):
-        return "no regular file"
-    if file.st_uid != me or parent.st_uid not in (0, me):
-        return f"it or its folder belongs to another user than {me}"
-    if (file.st_mode | parent.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"others than user {me} may write it or its folder"
-    return ""

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-from canbase_watchdog.own_folder import open_own_folder
+from canbase_base.own_folder import open_own_folder
 
 BATCH = 64
 """Datagrams taken in before the loop looks at the clock again."""

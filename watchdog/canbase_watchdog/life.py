@@ -12,6 +12,8 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from canbase_base.sd_notify import notify
+from canbase_base.single_instance import TakenError
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames, realtime
 from canbase_watchdog.bus_port import BusPort
@@ -20,8 +22,6 @@ from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.relay import Relay
-from canbase_watchdog.sd_notify import notify
-from canbase_watchdog.single_instance import TakenError
 from canbase_watchdog.trip_recorder import TripRecorder, folder_of
 from canbase_watchdog.watchdog import State, Watchdog
 

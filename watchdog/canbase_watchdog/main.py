@@ -17,9 +17,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import FrameType
 
+from canbase_base import single_instance as sole
+from canbase_base.latch_folder import SUFFIX, latch_folder
+from canbase_base.sd_notify import notify
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog import latch_file
-from canbase_watchdog import single_instance as sole
 from canbase_watchdog.bus_port import BusError
 from canbase_watchdog.lease_socket import LeaseSocketError
 from canbase_watchdog.life import RecordError, live
@@ -27,7 +28,6 @@ from canbase_watchdog.log import Lines, formatter, never_wait
 from canbase_watchdog.loop import BusDeadError
 from canbase_watchdog.relay import RelayError
 from canbase_watchdog.report import ALIVE_PERIOD_S
-from canbase_watchdog.sd_notify import notify
 
 RETRY_S = 1.0
 WORKED_S = 3.0
@@ -69,8 +69,8 @@ def _serve(config: WatchdogConfig) -> int:
     uid = os.getuid() if config.lease_uid is None else config.lease_uid
     config = dataclasses.replace(config, lease_uid=uid)
     with ExitStack() as stack:
-        stack.enter_context(sole.hold_bus(config.bus_arguments))
-        record = latch_file.path_of(os.environ, Path.home(), config.robot)
+        stack.enter_context(sole.take("watchdog", sole.bus_name(config.bus_arguments)))
+        record = latch_folder(os.environ, Path.home(), config.robot) / f"watchdog{SUFFIX}"
         stack.enter_context(sole.hold_record(record))
         _live_until_signal(config, record, asked)
     _log.info("ended by %s", signal.Signals(asked[0]).name)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import enum
 import logging
 
+from canbase_base.sd_notify import notify
 from canbase_watchdog import policy
 from canbase_watchdog.bus_health import BusHealth
-from canbase_watchdog.sd_notify import notify
 from canbase_watchdog.watchdog import Answer, State, Status, Watchdog
 
 COUNTERS_PERIOD_S = 10.0

@@ -14,11 +14,11 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from canbase_base.own_folder import replaced
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import input_ring
 from canbase_watchdog.input_ring import Cut, InputRing, Trip, TripWatch
 from canbase_watchdog.latch import Past
-from canbase_watchdog.own_folder import replaced
 from canbase_watchdog.watchdog import Watchdog
 
 WAITING = 4

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
+from canbase_base.single_instance import TakenError, bus_name, take
 from canbase_commissioning.bus_monitor import ListenSession
 from canbase_commissioning.census import Census, require_no_power
 from canbase_commissioning.conversation import Conversation, ConversationError, Talk, say
@@ -26,7 +27,6 @@ from canbase_commissioning.onbus.operator import Operator, Stopped, answered, st
 from canbase_commissioning.onbus.progress import Bar
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301.frame import Frame
-from canbase_runtime.single_instance import TakenError, bus_name, take
 from canbase_runtime.terminal import FAILED, fail
 
 T = TypeVar("T")

@@ -7,12 +7,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from canbase_base.single_instance import TakenError, bus_name, take
 from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
 from canbase_commissioning.session import Session
 from canbase_config.robot import Bus
-from canbase_runtime.single_instance import TakenError, bus_name, take
 from canbase_runtime.terminal import FAILED, agreed, fail
 
 

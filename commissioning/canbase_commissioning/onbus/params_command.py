@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Final
 
+from canbase_base.own_folder import replaced
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.object_dictionary import Address
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
@@ -20,7 +21,6 @@ from canbase_commissioning.parameters.dcf_writer import Heading, dcf_text
 from canbase_commissioning.parameters.saved import Parameters
 from canbase_config.eds_file import Eds, EdsError, read_eds, read_text
 from canbase_config.robot import Bus, Robot
-from canbase_runtime.own_folder import replaced
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, CommandError, fail, warn
 
 LISTEN_S: Final = 0.4

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from canbase_base.own_folder import replaced
 from canbase_commissioning.edits import Edit, edited
 from canbase_config.load import load_robot
-from canbase_runtime.own_folder import replaced
 
 
 def write_edits(config: Path, edits: Sequence[Edit]) -> None:

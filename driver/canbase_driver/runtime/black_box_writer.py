@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from canbase_base.own_folder import replaced
 from canbase_config.black_box import BlackBox
 from canbase_driver.runtime.black_box import Cut, EventEntry, Recording, asc_lines
 from canbase_driver.runtime.black_box_json import json_lines
 from canbase_driver.runtime.black_box_notes import title
 from canbase_driver.supervision.stop_history import StopRecord
-from canbase_runtime.own_folder import replaced
 
 WAITING = 4
 """Recordings that may wait to be written; more are dropped: a stop every second shows nothing new."""

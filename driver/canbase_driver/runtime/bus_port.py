@@ -17,12 +17,12 @@ from typing import Any
 
 import can
 
+from canbase_base.carrier import is_without_carrier
+from canbase_base.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, REMOTE, FrameSocket, open_bus
 from canbase_config.robot import DRIVER_NODE_ID
 from canbase_driver.cia301.frame import MAX_DATA_BYTES, Frame
 from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
 from canbase_driver.runtime.bus_traffic import Traffic, interface_traffic
-from canbase_driver.runtime.carrier import is_without_carrier
-from canbase_driver.runtime.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, REMOTE, FrameSocket, open_bus
 from canbase_driver.supervision.bus_health import BusReport, ControllerState
 
 RETRY_S = 1.0

@@ -11,12 +11,12 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from canbase_base.latch_folder import SUFFIX
+from canbase_base.single_instance import TakenError, bus_name, hold_record, take
 from canbase_config.robot import Robot
 from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.runtime.bus_port import ANOTHER_DRIVER, BusError, BusPort, is_of_a_driver
-from canbase_runtime.latch_file import hold
-from canbase_runtime.single_instance import TakenError, bus_name, take
 
 TURN_S = 0.01
 """The listening thread waits so long for a frame [s]."""
@@ -39,7 +39,7 @@ class Claim:
         self.folder = folder
         with ExitStack() as held:
             held.enter_context(take("driver", bus_name(robot.bus.arguments())))
-            held.enter_context(hold(folder, "driver"))
+            held.enter_context(hold_record(folder / f"driver{SUFFIX}"))
             self.bus = BusPort(robot.bus_arguments(), robot.timeouts.drive_heartbeat_s)
             held.callback(self.bus.close)
             self._held = held.pop_all()

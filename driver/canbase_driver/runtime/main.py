@@ -20,6 +20,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_base.sd_notify import Service
+from canbase_base.single_instance import TakenError
 from canbase_config.robot import Robot
 from canbase_config.stopping import given_up_s
 from canbase_driver.core import DriverCore
@@ -35,8 +37,6 @@ from canbase_runtime.latch_file import LatchFile, LatchKeeper
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
-from canbase_runtime.sd_notify import Service
-from canbase_runtime.single_instance import TakenError
 
 WAKE_S = 0.02
 """An outcome of the control thread waits at most this long for the next message before it is answered [s]."""

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from canbase_base.single_instance import bus_name, take
 from canbase_cli.running import Changed, Running, changes, running, running_checks
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_doctor.check import Verdict
-from canbase_runtime.single_instance import bus_name, take
 
 STARTED_S = 1_000_000.0
 FILE = "/etc/canbase/robot.yaml"

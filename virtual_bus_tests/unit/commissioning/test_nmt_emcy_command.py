@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from canbase_base.single_instance import bus_name, take
 from canbase_config.load import load_robot
-from canbase_runtime.single_instance import bus_name, take
 from support.command_world import CommandWorld, canbase
 
 

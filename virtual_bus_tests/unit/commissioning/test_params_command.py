@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from canbase_base.single_instance import bus_name, take
 from canbase_config.load import load_robot
-from canbase_runtime.single_instance import bus_name, take
 from support.command_world import CommandWorld, canbase
 
 EDS = str(files("canbase_config").joinpath("eds/canbase_cia402.eds"))

@@ -20,8 +20,8 @@ else:
     from pip._vendor import tomli as tomllib
 
 ROOT = Path(__file__).parents[3]
-WATCHDOG = sorted((ROOT / "watchdog" / "canbase_watchdog").rglob("*.py"))
-WATCHDOG_MAY_IMPORT = sys.stdlib_module_names | {"can", "canbase_watchdog", "canbase_config.watchdog"}
+WATCHDOG = sorted(file for name in ("watchdog", "base") for file in ROOT.glob(f"*/canbase_{name}/*.py"))
+WATCHDOG_MAY_IMPORT = sys.stdlib_module_names | {"can", "canbase_base", "canbase_watchdog", "canbase_config.watchdog"}
 
 
 def read(name: str) -> str:
@@ -98,8 +98,8 @@ def allowed(module: str) -> bool:
     return module in WATCHDOG_MAY_IMPORT or module.partition(".")[0] in WATCHDOG_MAY_IMPORT
 
 
-@pytest.mark.parametrize("file", WATCHDOG, ids=lambda file: file.name)
-def test_the_watchdog_imports_only_the_standard_library_python_can_and_its_dataclass(file: Path) -> None:
+@pytest.mark.parametrize("file", WATCHDOG, ids=lambda file: f"{file.parent.name}/{file.name}")
+def test_the_watchdog_imports_only_the_standard_library_python_can_its_base_and_its_dataclass(file: Path) -> None:
     strangers = {module for module in imported_modules(file.read_text(encoding="utf-8")) if not allowed(module)}
 
     assert strangers == set()

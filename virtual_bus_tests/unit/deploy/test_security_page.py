@@ -34,8 +34,7 @@ def test_the_list_of_what_listens_has_the_port_of_each_server() -> None:
 
 UNIX_SOCKETS = {
     "watchdog/canbase_watchdog/lease_socket.py": "lease socket (Unix)",
-    "watchdog/canbase_watchdog/single_instance.py": "abstract Unix sockets",
-    "runtime/canbase_runtime/single_instance.py": "abstract Unix sockets",
+    "runtime/canbase_base/single_instance.py": "abstract Unix sockets",
     "cli/canbase_cli/demo.py": "abstract Unix sockets",
     "virtual_bus_tests/canbase_sim/control_server.py": "control socket of the simulator (Unix)",
 }

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from canbase_base.lasting import UNKNOWN, forgets
+from canbase_base.latch_folder import forgetful
 from canbase_config.load import load_robot, sample
-from canbase_runtime.lasting import UNKNOWN, forgets
 from canbase_runtime.latch_file import LatchFile
 from canbase_runtime.latch_record import Defect, Record
 from canbase_watchdog import latch_file as of_watchdog
@@ -82,7 +83,7 @@ def test_what_is_not_known_to_last_counts_as_forgotten_in_driver_and_watchdog_al
     mounts = f"28 1 254:1 / / rw,relatime shared:1 - {kind} {device} rw\n"
     mounted(monkeypatch, mounts)
     assert (forgets("/var/lib/canbase", mounts) == "") is lasts
-    assert of_watchdog._forgets(tmp_path / "watchdog.latch") == forgets("/var/lib/canbase", mounts)
+    assert forgetful(tmp_path / "watchdog.latch") == forgets("/var/lib/canbase", mounts)
 
 
 def mounted(monkeypatch: pytest.MonkeyPatch, text: str) -> None:

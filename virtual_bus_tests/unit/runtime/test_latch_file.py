@@ -1,4 +1,4 @@
-"""The files of latch records, in both copies: driver and filter (canbase_config) and the watchdog's own."""
+"""The files of latch records: that of driver and filter, and the watchdog's own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from canbase_runtime.latch_file import LatchFile, LatchKeeper, create_first, latch_folder
+from canbase_base.latch_folder import latch_folder
+from canbase_runtime.latch_file import LatchFile, LatchKeeper, create_first
 from canbase_runtime.latch_record import SIZE, Mark, Record
 from canbase_watchdog import latch, latch_file
 
@@ -229,14 +230,8 @@ def test_a_write_that_fails_is_tried_again(folder: Path, part: str, monkeypatch:
         ({"STATE_DIRECTORY": "/var/lib/canbase:/var/lib/canbase/front"}, "/var/lib/canbase/front"),
     ],
 )
-def test_both_look_in_the_same_folder(environment: dict[str, str], folder: str) -> None:
+def test_where_the_records_are(environment: dict[str, str], folder: str) -> None:
     assert latch_folder(environment, Path("/home/u"), "carl") == Path(folder)
-    assert latch_file.path_of(environment, Path("/home/u"), "carl") == Path(folder) / "watchdog.latch"
-
-
-def test_both_copies_say_on_which_computer_they_are(folder: Path) -> None:
-    assert latch_file.machine() != ""
-    assert not latch_file.Keeper(folder / "watchdog.latch", "carl").past.latched
 
 
 def test_the_watchdogs_thread_has_a_small_stack_as_its_memory_is_locked(

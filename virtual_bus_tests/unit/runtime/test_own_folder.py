@@ -1,4 +1,4 @@
-"""Folders that another user could change are refused, and files are replaced in one way; both copies of the module."""
+"""Folders that another user could change are refused, and files are replaced in one way."""
 
 from __future__ import annotations
 
@@ -9,49 +9,34 @@ import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from types import ModuleType
 
 import pytest
 
+from canbase_base import own_folder
 from canbase_deploy.actions import Link, Remove, WriteFile
 from canbase_deploy.execute import ExecuteError, Executor, first_records
-from canbase_runtime import own_folder as of_all
 from canbase_runtime.latch_file import LatchFile, create_first
 from canbase_runtime.latch_record import Defect, Record
 from canbase_watchdog import latch, latch_file
-from canbase_watchdog import own_folder as of_watchdog
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 
 STRANGER = 12345
 
 
-@pytest.fixture(params=[of_all, of_watchdog], ids=["runtime", "watchdog"])
-def module(request: pytest.FixtureRequest) -> ModuleType:
-    assert isinstance(request.param, ModuleType)
-    return request.param
-
-
-def test_both_copies_have_the_same_text() -> None:
-    """What is corrected in one is corrected in the other."""
-    assert Path(of_all.__file__).read_text() == Path(of_watchdog.__file__).read_text()
-
-
-def test_folders_are_made_with_the_mode_and_a_name_that_is_missing_is_an_error(
-    module: ModuleType, tmp_path: Path
-) -> None:
+def test_folders_are_made_with_the_mode_and_a_name_that_is_missing_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "a" / "b"
     with pytest.raises(FileNotFoundError):
-        module.open_own_folder(path)
-    os.close(module.open_own_folder(path, 0o700))
+        own_folder.open_own_folder(path)
+    os.close(own_folder.open_own_folder(path, 0o700))
     assert path.stat().st_mode & 0o777 == path.parent.stat().st_mode & 0o777 == 0o700
     (tmp_path / "file").touch()
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(NotADirectoryError) as raised:
-        module.open_own_folder(tmp_path / "file" / "b", 0o700)
+        own_folder.open_own_folder(tmp_path / "file" / "b", 0o700)
     assert raised.value.filename == str(tmp_path / "file")
-    os.close(module.open_own_folder(path))
+    os.close(own_folder.open_own_folder(path))
     assert len(os.listdir("/proc/self/fd")) == before
-    os.close(module.open_own_folder(Path("/")))
+    os.close(own_folder.open_own_folder(Path("/")))
 
 
 @pytest.mark.parametrize(
@@ -65,88 +50,84 @@ def test_folders_are_made_with_the_mode_and_a_name_that_is_missing_is_an_error(
         ("     65535       1000          1\n", {65534}),
     ],
 )
-def test_users_outside_of_a_user_namespace_have_one_number(module: ModuleType, uid_map: str, outside: set[int]) -> None:
-    assert module.users_outside(uid_map, "65534\n") == outside
+def test_users_outside_of_a_user_namespace_have_one_number(uid_map: str, outside: set[int]) -> None:
+    assert own_folder.users_outside(uid_map, "65534\n") == outside
 
 
 @pytest.mark.parametrize(("uid_map", "fine"), [("0 1000 1", True), ("0 0 4294967295", False), ("", True), ("x", False)])
 def test_folders_of_users_outside_are_those_of_the_system(
-    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, uid_map: str, *, fine: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, uid_map: str, *, fine: bool
 ) -> None:
     (tmp_path / "uid_map").write_text(uid_map)
     (tmp_path / "overflowuid").write_text("65534")
-    monkeypatch.setattr(module, "UID_MAP", tmp_path / "uid_map")
-    monkeypatch.setattr(module, "OVERFLOW_UID", tmp_path / "overflowuid")
+    monkeypatch.setattr(own_folder, "UID_MAP", tmp_path / "uid_map")
+    monkeypatch.setattr(own_folder, "OVERFLOW_UID", tmp_path / "overflowuid")
     found = os.stat_result((0o40755, 0, 0, 2, 65534, 65534, 0, 0, 0, 0))
-    with contextlib.nullcontext() if fine else pytest.raises(module.FolderError, match="belongs to user 65534"):
-        module._judge(found, Path("/"), last=False)
+    with contextlib.nullcontext() if fine else pytest.raises(own_folder.FolderError, match="belongs to user 65534"):
+        own_folder._judge(found, Path("/"), last=False)
 
 
 @pytest.mark.parametrize("deep", [0, 1, 2])
 @pytest.mark.parametrize(("mode", "fine"), [(0o755, True), (0o757, False), (0o1777, True)])
-def test_a_folder_that_everybody_may_write(
-    module: ModuleType, tmp_path: Path, deep: int, mode: int, *, fine: bool
-) -> None:
+def test_a_folder_that_everybody_may_write(tmp_path: Path, deep: int, mode: int, *, fine: bool) -> None:
     """At each depth above, and itself. In one with the sticky bit others cannot move what is not theirs."""
     path = tmp_path / "a" / "b" / "c"
     path.mkdir(parents=True)
     [path, *path.parents][deep].chmod(mode)
     if fine:
-        os.close(module.open_own_folder(path))
+        os.close(own_folder.open_own_folder(path))
         return
-    with pytest.raises(module.FolderError, match=f"chmod go-w {[path, *path.parents][deep]}"):
-        module.open_own_folder(path)
+    with pytest.raises(own_folder.FolderError, match=f"chmod go-w {[path, *path.parents][deep]}"):
+        own_folder.open_own_folder(path)
 
 
 @pytest.mark.needs_root("give a folder to another group")
 @pytest.mark.parametrize(
     ("group", "above", "fine"), [(0, True, True), (STRANGER, True, False), (0, False, False)], ids=str
 )
-def test_a_folder_that_a_group_may_write(
-    module: ModuleType, tmp_path: Path, group: int, *, above: bool, fine: bool
-) -> None:
+def test_a_folder_that_a_group_may_write(tmp_path: Path, group: int, *, above: bool, fine: bool) -> None:
     """Of the folders above only with the group of root, or the own group of the owner (umask 002)."""
     path = tmp_path / "a" / "b"
     path.mkdir(parents=True)
     changed = path.parent if above else path
     os.chown(changed, -1, group)
     changed.chmod(0o775)
-    with contextlib.nullcontext() if fine else pytest.raises(module.FolderError, match="others may write"):
-        os.close(module.open_own_folder(path))
+    with contextlib.nullcontext() if fine else pytest.raises(own_folder.FolderError, match="others may write"):
+        os.close(own_folder.open_own_folder(path))
 
 
 @pytest.mark.needs_root("give a folder to another user")
 @pytest.mark.parametrize("deep", [0, 1, 2])
-def test_a_folder_of_another_user(module: ModuleType, tmp_path: Path, deep: int) -> None:
+def test_a_folder_of_another_user(tmp_path: Path, deep: int) -> None:
     path = tmp_path / "a" / "b" / "c"
     path.mkdir(parents=True)
     os.chown([path, *path.parents][deep], STRANGER, -1)
-    with pytest.raises(module.FolderError, match=f"belongs to user {STRANGER}"):
-        module.open_own_folder(path / "new" if deep == 0 else path, 0o700)
+    with pytest.raises(own_folder.FolderError, match=f"belongs to user {STRANGER}"):
+        own_folder.open_own_folder(path / "new" if deep == 0 else path, 0o700)
     assert not (path / "new").exists()
 
 
-def test_own_links_are_followed(module: ModuleType, tmp_path: Path) -> None:
+def test_own_links_are_followed(tmp_path: Path) -> None:
     """As /var/run is one: absolute, relative, with dots; a ring ends."""
     (tmp_path / "there" / "in").mkdir(parents=True)
     (tmp_path / "one").symlink_to(tmp_path / "there")
     (tmp_path / "there" / "two").symlink_to("../there/./in")
-    found = module.open_own_folder(tmp_path / "one" / "two")
+    found = own_folder.open_own_folder(tmp_path / "one" / "two")
     assert os.path.samestat(os.fstat(found), (tmp_path / "there" / "in").stat())
     os.close(found)
     (tmp_path / "ring").symlink_to("ring")
     with pytest.raises(OSError, match="too many links") as raised:
-        module.open_own_folder(tmp_path / "ring")
+        own_folder.open_own_folder(tmp_path / "ring")
     assert raised.value.errno == errno.ELOOP
 
 
 @pytest.mark.needs_root("give a link to another user")
-def test_a_link_of_another_user(module: ModuleType, tmp_path: Path) -> None:
+def test_a_link_of_another_user(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "there")
     os.lchown(tmp_path / "link", STRANGER, -1)
-    with pytest.raises(module.FolderError, match=f"{tmp_path}/link is a link of user {STRANGER}. Remove it"):
-        module.open_own_folder(tmp_path / "link" / "new", 0o700)
+    with pytest.raises(own_folder.FolderError, match=f"{tmp_path}/link is a link of user {STRANGER}. Remove it"):
+        own_folder.open_own_folder(tmp_path / "link" / "new", 0o700)
     assert not list((tmp_path / "there").iterdir())
 
 
@@ -220,7 +201,7 @@ def test_the_socket_has_its_mode_from_its_first_moment(tmp_path: Path, monkeypat
 @pytest.mark.parametrize("there", [True, False])
 @pytest.mark.parametrize("step", ["block", "fsync", "rename"])
 def test_a_file_that_cannot_be_replaced_is_as_it_was_and_nothing_is_left_beside_it(
-    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, *, there: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, *, there: bool
 ) -> None:
     path = tmp_path / "file"
     if there:
@@ -232,7 +213,7 @@ def test_a_file_that_cannot_be_replaced_is_as_it_was_and_nothing_is_left_beside_
 
     if step != "block":
         monkeypatch.setattr(os, step, full)
-    with pytest.raises(OSError, match="no space left"), module.replaced(path) as file:  # noqa: PT012 - a block
+    with pytest.raises(OSError, match="no space left"), own_folder.replaced(path) as file:  # noqa: PT012 - a block
         file.write(b"new")
         if step == "block":
             full()
@@ -242,7 +223,7 @@ def test_a_file_that_cannot_be_replaced_is_as_it_was_and_nothing_is_left_beside_
 
 @pytest.mark.parametrize(("error", "fine"), [(None, True), (errno.EINVAL, True), (errno.EIO, False)])
 def test_a_new_file_is_on_disk_before_it_has_its_name_and_its_folder_after(
-    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: int | None, *, fine: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: int | None, *, fine: bool
 ) -> None:
     path, rename, steps = tmp_path / "file", os.rename, list[str]()
 
@@ -258,7 +239,10 @@ def test_a_new_file_is_on_disk_before_it_has_its_name_and_its_folder_after(
 
     monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(os, "rename", renamed)
-    with contextlib.nullcontext() if fine else pytest.raises(OSError, match="cannot"), module.replaced(path) as file:
+    with (
+        contextlib.nullcontext() if fine else pytest.raises(OSError, match="cannot"),
+        own_folder.replaced(path) as file,
+    ):
         file.write(b"whole")
     assert steps == ["whole", "rename", "folder"]
 
@@ -267,7 +251,7 @@ def test_a_new_file_is_on_disk_before_it_has_its_name_and_its_folder_after(
     ("before", "private", "after"), [(0o640, False, 0o640), (0o666, True, 0o600), (None, False, 0o644)]
 )
 def test_who_may_read_a_file_stays_and_a_link_is_not_followed(
-    module: ModuleType, tmp_path: Path, before: int | None, after: int, *, private: bool
+    tmp_path: Path, before: int | None, after: int, *, private: bool
 ) -> None:
     path, aim = tmp_path / "file", tmp_path / "aim"
     if before is not None:
@@ -276,7 +260,7 @@ def test_who_may_read_a_file_stays_and_a_link_is_not_followed(
     path.symlink_to(aim)
     mask = os.umask(0o022)
     try:
-        with module.replaced(path, private=private) as file:
+        with own_folder.replaced(path, private=private) as file:
             file.write(b"new")
             seen = os.fstat(file.fileno()).st_mode & 0o777
     finally:
@@ -288,29 +272,29 @@ def test_who_may_read_a_file_stays_and_a_link_is_not_followed(
 
 @pytest.mark.parametrize("private", [False, True])
 @pytest.mark.parametrize("aim", ["/dev/null", "fifo", "."])
-def test_what_is_no_file_is_not_replaced(module: ModuleType, tmp_path: Path, aim: str, *, private: bool) -> None:
+def test_what_is_no_file_is_not_replaced(tmp_path: Path, aim: str, *, private: bool) -> None:
     """As /dev/stdout, which is a link to a terminal."""
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "link").symlink_to(aim)
     for path in (tmp_path / "link", tmp_path / aim):
-        with pytest.raises(OSError, match="is no regular file"), module.replaced(path, private=private):
+        with pytest.raises(OSError, match="is no regular file"), own_folder.replaced(path, private=private):
             raise AssertionError
     assert sorted(each.name for each in tmp_path.iterdir()) == ["fifo", "link"]
 
 
 @pytest.mark.needs_root("give a file to another user")
-def test_a_file_of_another_user_stays_with_that_user(module: ModuleType, tmp_path: Path) -> None:
+def test_a_file_of_another_user_stays_with_that_user(tmp_path: Path) -> None:
     """As robot.yaml of an integrator that `sudo canbase setup commission` changes."""
     path = tmp_path / "file"
     path.touch(0o640)
     os.chown(path, STRANGER, STRANGER + 1)
-    with module.replaced(path):
+    with own_folder.replaced(path):
         pass
     assert (path.stat().st_uid, path.stat().st_gid, path.stat().st_mode & 0o777) == (STRANGER, STRANGER + 1, 0o640)
 
 
 def test_who_may_not_give_files_away_replaces_them_all_the_same(
-    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As the driver's service replaces the stop file that root has written in the services' folder."""
 
@@ -322,7 +306,7 @@ def test_who_may_not_give_files_away_replaces_them_all_the_same(
     monkeypatch.setattr(os, "fchown", refused)
     for before, after in ((0o640, 0o640), (0o666, 0o644)):  # who could write it is another one than the owner now
         path.chmod(before)
-        with module.replaced(path) as file:
+        with own_folder.replaced(path) as file:
             file.write(b"new")
         assert (path.read_bytes(), path.stat().st_mode & 0o777) == (b"new", after)
     assert [each.name for each in tmp_path.iterdir()] == ["stop.json"]

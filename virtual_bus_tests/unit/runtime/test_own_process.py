@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from canbase_base.single_instance import bus_name, take
 from canbase_cli.main import app
 from canbase_config.load import load_robot, sample
 from canbase_runtime.own_process import NotOursError, refusal, send_signal
-from canbase_runtime.single_instance import bus_name, take
 
 ME = os.geteuid()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from canbase_runtime.sd_notify import ALIVE_PERIOD_S, Service
+from canbase_base.sd_notify import ALIVE_PERIOD_S, Service
 
 
 @pytest.fixture

@@ -6,69 +6,50 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from canbase_runtime.latch_file import hold
-from canbase_runtime.single_instance import TakenError, bus_name, check, take
-from canbase_watchdog import single_instance as sole
-
-Take = Callable[[str], AbstractContextManager[Any]]
+from canbase_base.single_instance import TakenError, bus_name, check, hold_record, take
 
 
 def _bus(name: str) -> dict[str, Any]:
     return {"interface": "socketcan", "channel": name}
 
 
-TAKES: Mapping[str, tuple[Take, type[Exception], str]] = {
-    "driver": (
-        lambda name: take("driver", bus_name(_bus(name))),
-        TakenError,
-        "from canbase_runtime.single_instance import bus_name, take; held = take('driver', bus_name({bus}))",
-    ),
-    "watchdog": (
-        lambda name: sole.hold_bus(_bus(name)),
-        sole.TakenError,
-        "from canbase_watchdog.single_instance import hold_bus; held = hold_bus({bus})",
-    ),
-}
-
-
-@pytest.fixture(params=list(TAKES))
-def kind(request: pytest.FixtureRequest) -> tuple[Take, type[Exception], str]:
-    return TAKES[request.param]
+def hold(name: str) -> AbstractContextManager[Any]:
+    return take("driver", bus_name(_bus(name)))
 
 
 @pytest.mark.parametrize("length", [1, 200])
-def test_it_is_free_again_when_it_is_closed(kind: tuple[Take, type[Exception], str], length: int) -> None:
+def test_it_is_free_again_when_it_is_closed(length: int) -> None:
     name = f"{os.getpid()}-closed-" + "x" * length
     for _ in range(2):
-        with kind[0](name):
-            with pytest.raises(kind[1], match=f"process {os.getpid()} of user {os.geteuid()}"):
-                kind[0](name)
-            with kind[0](name + "y"):
+        with hold(name):
+            with pytest.raises(TakenError, match=f"process {os.getpid()} of user {os.geteuid()}"):
+                hold(name)
+            with hold(name + "y"):
                 pass
 
 
 # held by another process ── SIGKILL ── free at once
-def test_the_kernel_frees_it_whatever_ends_its_process(kind: tuple[Take, type[Exception], str]) -> None:
+def test_the_kernel_frees_it_whatever_ends_its_process() -> None:
     name = f"{os.getpid()}-killed"
-    code = kind[2].format(bus=_bus(name)) + "; print('held', flush=True); input()"
+    code = "from canbase_base.single_instance import bus_name, take; "
+    code += f"held = take('driver', bus_name({_bus(name)})); print('held', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         env=os.environ | {"_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
     ) as child:  # fmt: skip
         assert child.stdout is not None
         assert child.stdout.readline() == b"held\n"
-        with pytest.raises(kind[1], match=f"process {child.pid} of user"):
-            kind[0](name)
+        with pytest.raises(TakenError, match=f"process {child.pid} of user"):
+            hold(name)
         child.send_signal(signal.SIGKILL)
         child.wait(5.0)
-    with kind[0](name):
+    with hold(name):
         pass
 
 
@@ -88,34 +69,24 @@ def test_buses_are_told_apart_by_interface_channel_and_port() -> None:
     assert bus_name(one | {"hop_limit": 1}) in names
 
 
-def test_whoever_comes_second_is_told_who_holds_it_also_after_many_have_asked(
-    kind: tuple[Take, type[Exception], str],
-) -> None:
+def test_whoever_comes_second_is_told_who_holds_it_also_after_many_have_asked() -> None:
     """As systemd does that starts it again and again: nobody takes these calls."""
     name = f"{os.getpid()}-asked"
-    with kind[0](name):
+    with hold(name):
         for _ in range(200):
-            with pytest.raises(kind[1], match=f"process {os.getpid()} of user"):
-                kind[0](name)
+            with pytest.raises(TakenError, match=f"process {os.getpid()} of user"):
+                hold(name)
 
 
-RECORDS: Mapping[str, tuple[Take, type[Exception]]] = {
-    "driver": (lambda folder: hold(Path(folder), "driver"), TakenError),
-    "watchdog": (lambda folder: sole.hold_record(Path(folder) / "watchdog.latch"), sole.TakenError),
-}
-
-
-@pytest.mark.parametrize("part", list(RECORDS))
-def test_two_robots_of_one_name_on_two_buses_do_not_write_one_record(tmp_path: Path, part: str) -> None:
+def test_two_robots_of_one_name_on_two_buses_do_not_write_one_record(tmp_path: Path) -> None:
     """One that is reset or ends in order would make the other forget its latched stop. A link is the same folder."""
-    take_record, taken = RECORDS[part]
     (tmp_path / "carl").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "carl")
-    with take_record(str(tmp_path / "carl")), take_record(str(tmp_path / "rosa")):
+    with hold_record(tmp_path / "carl" / "driver.latch"), hold_record(tmp_path / "rosa" / "driver.latch"):
         for same in ("carl", "link"):
-            with pytest.raises(taken, match="Two robots on one computer need two names") as refused:
-                take_record(str(tmp_path / same))
+            with pytest.raises(TakenError, match="Two robots on one computer need two names") as refused:
+                hold_record(tmp_path / same / "driver.latch")
             assert f"process {os.getpid()} of user" in str(refused.value)
-            assert f"{part}.latch" in str(refused.value)
-    with take_record(str(tmp_path / "carl")):
+            assert "driver.latch" in str(refused.value)
+    with hold_record(tmp_path / "carl" / "driver.latch"):
         pass

@@ -5,8 +5,6 @@ python-can opens and configures the bus. Its `recv` waits by one system call, ta
 loop took of the processor. A bus that is no socket (`virtual`, serial adapters) is read by python-can as before.
 
 Identifiers have the flags of linux/can.h above them. Whatever is greater than MAX_COB_ID is no data frame of CANopen.
-
-A second copy, on purpose, of what canbase_driver.runtime.frame_socket does for the driver; a test compares both.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from typing import Any, Final, Protocol
 
 import can
 
-from canbase_watchdog.local_frames import keep_to_this_computer
+from canbase_base.local_frames import keep_to_this_computer
 
 MAX_COB_ID: Final = 0x7FF
 MAX_DATA_BYTES: Final = 8

@@ -18,6 +18,8 @@ _CREDENTIALS: Final = struct.Struct("iII")
 _LONGEST: Final = 60
 CALLERS: Final = 4096
 """The backlog: calls are never accepted, and a process beyond it does not learn who holds it."""
+WRITER: Final = "writer of records"
+"""What is held while a process writes a record of stops."""
 ADVICE: Final = "Only one may run; end it first (`canbase doctor` shows what runs)"
 
 
@@ -42,6 +44,22 @@ def take(task: str, name: str) -> socket.socket:
             raise
         raise TakenError(f"another {task} has {name}: {_who(task, name)}. {ADVICE}") from error
     return holder
+
+
+def hold_record(path: Path) -> socket.socket:
+    """Be the only one that writes this record of stops, until it is closed or the process ends.
+
+    Raises TakenError with the holder: two robots of one name would forget each other's latched stops.
+    """
+    try:
+        return take(WRITER, record_name(path))
+    except TakenError as error:
+        raise TakenError(f"{error}. Two robots on one computer need two names (`name` in robot.yaml)") from error
+
+
+def record_name(path: Path) -> str:
+    """What `hold_record` holds. A link to a folder is that folder."""
+    return str(path.parent.resolve() / path.name)
 
 
 def check(task: str, name: str) -> None:
