@@ -14,6 +14,7 @@ from launch.actions import DeclareLaunchArgument, EmitEvent, RegisterEventHandle
 from launch.conditions import IfCondition
 from launch.event_handlers import OnShutdown
 from launch.events import Shutdown as ShutdownEvent
+from launch.events import matches_action
 from launch.events.process import SignalProcess
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
@@ -29,7 +30,8 @@ ARGUMENTS = (
 )
 
 
-def _part(executable: str, *arguments: object, **options: object) -> Node:
+def _part(executable: str, *arguments: object, after: tuple[EmitEvent, ...] = (), **options: object) -> Node:
+    """`after`: what follows its end, before all others end."""
     return Node(
         package="canbase",
         executable=executable,
@@ -40,7 +42,7 @@ def _part(executable: str, *arguments: object, **options: object) -> Node:
         sigterm_timeout=END_S,
         sigkill_timeout=END_S,
         additional_env={"CANBASE_PARENT": str(os.getpid())},
-        on_exit=Shutdown(reason=f"{executable} ended"),
+        on_exit=[*after, Shutdown(reason=f"{executable} ended")],
         **options,
     )
 
@@ -53,18 +55,22 @@ def _interrupt_all(event: ShutdownEvent, _context: LaunchContext) -> EmitEvent |
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The parts, those first that stop the others."""
+    """The parts, those first that stop the others. Ctrl-C does not end the watchdog: the end of the driver does."""
     autostart = PythonExpression(
         ["'--autostart' if '", LaunchConfiguration("autostart"), "' == 'true' else '--no-autostart'"]
+    )
+    watchdog = _part("watchdog")
+    end_watchdog = EmitEvent(
+        event=SignalProcess(signal_number=signal.SIGTERM, process_matcher=matches_action(watchdog))
     )
     return LaunchDescription(
         [
             *ARGUMENTS,
             RegisterEventHandler(OnShutdown(on_shutdown=_interrupt_all)),
             _part("sim", condition=IfCondition(LaunchConfiguration("sim"))),
-            _part("watchdog"),
+            watchdog,
             _part("velocity_mux"),
-            _part("motor_driver", autostart),
+            _part("motor_driver", autostart, after=(end_watchdog,)),
             _part("drive_distance_server"),
         ]
     )

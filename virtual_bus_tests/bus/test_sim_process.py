@@ -76,14 +76,14 @@ def test_it_boots_answers_and_tells_the_truth_with_monotonic_stamps(tmp_path: Pa
 
 
 def test_an_interrupt_of_all_parts_leaves_the_drives_to_the_driver_that_stops_them(tmp_path: Path) -> None:
-    """SYNC every 0.1 s ── SIGINT of the terminal, and of launch ── 1.2 s later a drive still answers ── no SYNC any
-    more ── they end."""
+    """SYNC every 0.1 s ── SIGINT of the terminal, and 1.2 s later of a slow launch ── a drive still answers ── no SYNC
+    any more ── they end."""
     of = _robot(tmp_path)
     ask = can.Message(arbitration_id=0x601, data=bytes.fromhex("4000100000000000"), is_extended_id=False)
     with can.Bus(**of.bus.arguments()) as bus, _running(tmp_path, of) as (process, _):
-        for cycle in range(14):
+        for cycle in range(16):
             bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
-            if cycle in (1, 3):
+            if cycle in (1, 13):
                 process.send_signal(signal.SIGINT)
             _frames(bus, 0.1)
         bus.send(ask)
@@ -185,17 +185,48 @@ time.sleep(60)
 
 
 def test_what_ros2_launch_started_ends_with_it_even_when_that_is_killed(tmp_path: Path) -> None:
+    """Of the drives: after the driver, which ends by the same signal."""
     of = _robot(tmp_path)
     (tmp_path / "robot.json").write_text(json.dumps(of.model_dump(mode="json")), encoding="utf-8")
     (tmp_path / "sim").symlink_to(Path(__file__).parents[2] / "deploy" / "bin" / "node")
     command = [sys.executable, "-c", LAUNCH, str(tmp_path / "sim"), "--config", str(tmp_path / "robot.json")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as launch:
+    with (
+        can.Bus(**of.bus.arguments()) as bus,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as launch,
+    ):
         assert launch.stdout is not None
         part = int(launch.stdout.readline())
         _connect(control_path(of)).close()
-        launch.kill()
+        for cycle in range(6):
+            bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+            if cycle == 1:
+                launch.kill()
+            _frames(bus, 0.1)
+        _connect(control_path(of)).close()
         try:
             launch.communicate(timeout=5.0)  # until the part, too, has closed its end
         except subprocess.TimeoutExpired:
             os.kill(part, signal.SIGKILL)
             raise
+
+
+def test_ctrl_c_does_not_end_the_watchdog_of_ros2_launch(tmp_path: Path) -> None:
+    """It watches until the driver has stopped the base; then launch sends SIGTERM."""
+    of = _robot(tmp_path)
+    (tmp_path / "robot.json").write_text(json.dumps(of.model_dump(mode="json")), encoding="utf-8")
+    (tmp_path / "watchdog").symlink_to(Path(__file__).parents[2] / "deploy" / "bin" / "node")
+    command = [sys.executable, str(tmp_path / "watchdog"), "--config", str(tmp_path / "robot.json")]
+    own = {"CANBASE_PARENT": str(os.getpid()), "XDG_STATE_HOME": str(tmp_path)}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ | own) as watchdog:
+        try:
+            end = time.monotonic() + 20.0
+            while not Path(of.lease.socket).exists():
+                assert time.monotonic() < end, "the watchdog does not come up"
+                time.sleep(0.05)
+            watchdog.send_signal(signal.SIGINT)
+            with pytest.raises(subprocess.TimeoutExpired):
+                watchdog.wait(0.7)
+            watchdog.terminate()
+            assert watchdog.wait(5.0) == 0
+        finally:
+            watchdog.kill()

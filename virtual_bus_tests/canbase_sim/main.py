@@ -1,14 +1,13 @@
 """`canbase serve sim`: the simulated drives of a robot.yaml in real time, until SIGINT or SIGTERM.
 
 Ctrl-C and `ros2 launch` interrupt all parts of a robot at once. Drives that vanish while the driver brings the base to
-standstill are a failure of the drives, which is latched for the next start: after one SIGINT they stay as long as they
-receive SYNC.
+standstill are a failure of the drives, which is latched for the next start: after SIGINT they stay as long as they
+receive SYNC. launch sends another one to each part, on a slow computer seconds after that of the terminal.
 """
 
 from __future__ import annotations
 
 import logging
-import math
 import signal
 import sys
 import time
@@ -31,15 +30,13 @@ log = logging.getLogger(__name__)
 
 IN_USE_S = 1.0
 """A driver sends SYNC more often than once in this time [s]."""
-ONE_S = 1.0
-"""Interrupts that are nearer to each other are one Ctrl-C: that of the terminal, and that which launch sends [s]."""
 
 
 def run(robot: Robot, control: str | None = None, *, quiet: bool = False, factory_fresh: bool = False) -> int:
     """Simulate the drives of `robot` on its bus, with the control socket at `control` (default `control_path(robot)`).
 
     `quiet`: warnings alone are logged. `factory_fresh`: every drive has node id 1 and 125 kbit/s.
-    Returns the exit code: 0 after SIGINT or SIGTERM, 1 when the bus or the control socket cannot be used.
+    Returns the exit code: 0 after a signal, 1 when the bus or the control socket cannot be used.
     """
     logging.basicConfig(
         level=logging.WARNING if quiet else logging.INFO,
@@ -75,30 +72,27 @@ def _simulate(robot: Robot, path: Path, signals: list[int], parameters: BenchPar
                 ends = is_over(signals, time.monotonic() - loop.sync_at_s)
                 if signals and not ends and not told:
                     told = True
-                    log.info("the driver still uses these drives: they end after it (Ctrl-C again: at once)")
+                    log.info("the driver still uses these drives: they end after it (Ctrl-\\ or SIGTERM: at once)")
                 return ends
 
             loop.run(over)
 
 
 def is_over(signals: Sequence[int], silent_s: float) -> bool:
-    """`signals`: those that came; `silent_s`: since the last SYNC [s]. One SIGINT alone lets the driver end first."""
-    return bool(signals) and (silent_s > IN_USE_S or list(signals) != [signal.SIGINT])
+    """`signals`: those that came; `silent_s`: since the last SYNC [s]. SIGINT lets the driver end first."""
+    return bool(signals) and (silent_s > IN_USE_S or set(signals) != {signal.SIGINT})
 
 
 @contextmanager
 def _stop_signals() -> Iterator[list[int]]:
-    """The numbers of the signals that came; afterwards SIGINT and SIGTERM do again what they did before."""
+    """The numbers of the signals that came; afterwards they do again what they did before."""
     received: list[int] = []
-    came_at_s = -math.inf
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        nonlocal came_at_s
-        before_s, came_at_s = came_at_s, time.monotonic()
-        if number != signal.SIGINT or came_at_s - before_s > ONE_S:
-            received.append(number)
+        received.append(number)
 
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    ends = (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM)
+    before = {number: signal.signal(number, on_signal) for number in ends}
     try:
         yield received
     finally:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -51,6 +54,27 @@ def test_a_launch_file_needs_nothing_but_what_ros2_launch_has() -> None:
     }
     strangers = {name.partition(".")[0] for name in imported} - sys.stdlib_module_names
     assert strangers == {"launch", "launch_ros"}
+
+
+def test_the_end_of_the_driver_ends_the_watchdog_which_ctrl_c_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So the watchdog sees the base stop, and latches nothing. After 15 s launch sends SIGTERM to all."""
+    names = ("", ".actions", ".conditions", ".event_handlers", ".events", ".events.process", ".substitutions")
+    parts = {name: MagicMock() for name in (*(f"launch{name}" for name in names), "launch_ros", "launch_ros.actions")}
+    for name, part in parts.items():
+        monkeypatch.setitem(sys.modules, name, part)
+    made: dict[str, MagicMock] = {}
+    node = parts["launch_ros.actions"].Node
+    node.side_effect = lambda **options: made.setdefault(options["executable"], MagicMock(options=options))
+
+    runpy.run_path(str(ROOT / "deploy/launch/robot.launch.py"))["generate_launch_description"]()
+
+    parts["launch.events"].matches_action.assert_called_once_with(made["watchdog"])
+    matches = parts["launch.events"].matches_action.return_value
+    end = parts["launch.events.process"].SignalProcess
+    end.assert_called_once_with(signal_number=signal.SIGTERM, process_matcher=matches)
+    emit = parts["launch.actions"].EmitEvent
+    emit.assert_called_once_with(event=end.return_value)
+    assert made["motor_driver"].options["on_exit"][0] is emit.return_value
 
 
 PROJECT = """

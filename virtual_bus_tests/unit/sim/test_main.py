@@ -8,7 +8,7 @@ import pytest
 
 from canbase_sim.main import IN_USE_S, is_over
 
-INT, TERM = signal.SIGINT, signal.SIGTERM
+INT, QUIT, TERM = signal.SIGINT, signal.SIGQUIT, signal.SIGTERM
 LONG, JUST = IN_USE_S + 0.01, IN_USE_S - 0.01
 
 
@@ -18,12 +18,14 @@ LONG, JUST = IN_USE_S + 0.01, IN_USE_S - 0.01
         ([], LONG, False),
         ([INT], JUST, False),
         ([INT], LONG, True),
-        ([INT, INT], 0.0, True),
+        ([INT, INT], JUST, False),
+        ([INT, INT], LONG, True),
+        ([INT, QUIT], 0.0, True),
         ([TERM], 0.0, True),
         ([INT, TERM], 0.0, True),
     ],
 )
-def test_one_interrupt_waits_for_the_driver_and_everything_else_ends_them(
+def test_interrupts_wait_for_the_driver_and_everything_else_ends_them(
     signals: list[int], silent_s: float, over: bool
 ) -> None:
     assert is_over(signals, silent_s) is over
