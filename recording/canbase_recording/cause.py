@@ -102,8 +102,12 @@ ADVICE: Final[dict[Cause, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a rule has seen: since when, a sentence with the values, and the node (0: no single one)."""
+    """What a rule has seen: since when, a sentence with the values, and the node (0: no single one).
+
+    `sender`: of the quick stops on the watchdog's PDOs, where the rule shows that it is not the watchdog.
+    """
 
     at_s: float
     text: str
     node_id: int = 0
+    sender: str = ""

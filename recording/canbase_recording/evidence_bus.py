@@ -49,10 +49,14 @@ def recorder_paused(scene: Scene) -> Found | None:
 def node_restarted(scene: Scene) -> Found | None:
     """A drive sends its boot-up though nobody has reset it."""
     for node_id in scene.drive_nodes:
+        before_s = -math.inf
         for at_s, state in scene.heartbeats.get(node_id, ()):
-            if state != 0 or at_s < scene.reaction_s - 1.0:
+            if state != 0:
                 continue
-            reset = any(command in _RESETS and to in (0, node_id) and at <= at_s for at, (command, to, _) in scene.nmt)
+            resets = (at for at, (command, to, _) in scene.nmt if command in _RESETS and to in (0, node_id))
+            reset, before_s = any(before_s < at <= at_s for at in resets), at_s
+            if at_s < scene.reaction_s - 1.0:
+                continue
             since_s = last_before(scene.node_times[node_id], min(at_s - 1e-6, scene.reaction_s))
             away = since_s if since_s < at_s - LEAST_SILENCE_S else at_s
             if not reset and away <= scene.reaction_s:
@@ -80,7 +84,7 @@ def _killed(scene: Scene, own: list[float], what: str, node_id: int) -> Found | 
     if not acts or alive or last_s < at_s - ended_s:
         return None
     text = f"{what} after {last_s:.3f} s, and its stop process acts: it was killed, or it crashed"
-    return Found(last_s, text, node_id)
+    return Found(last_s, text, node_id, f"the {'driver' if node_id == DRIVER_NODE_ID else 'watchdog'}'s stop process")
 
 
 def _driver_missing(scene: Scene) -> Found | None:

@@ -77,9 +77,11 @@ def _story(number: int, count: int, story: Story) -> Iterator[str]:
 
 
 def standstill_sentence(story: Story) -> str:
-    """When and after how far the wheels stood, from the first cause on."""
+    """When and after what distance the wheels were stationary, from the first cause on."""
     if not story.standstill.wheels:
         return "unknown: the recording has no position (6064h)"
+    if story.standstill.was_stationary:
+        return "the base was stationary"
     return "; ".join(_wheel(wheel) for wheel in story.standstill.wheels)
 
 

@@ -64,11 +64,15 @@ def explain(
             found = network.on_frame(entry)
         else:
             told.notes += 1
-            found = notes.on_note(entry)
+            found = notes.on_note(entry, powered=network.is_enabled)
         for event in found:
             _take(told, finder, event)
     for event in network.end(told.ended_s):
         _take(told, finder, event)
+    if (note := notes.cut_off(told.ended_s)) is not None:
+        finder.on_entry(note)
+        for event in notes.on_note(note):
+            _take(told, finder, event)
     finder.end(told.ended_s)
     told.stories, told.further_stops, told.echoes = finder.stories, finder.further, echo.echoes
     return told

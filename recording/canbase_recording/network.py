@@ -89,6 +89,11 @@ class Network:
         """What is missing at the end of the recording."""
         return self._missing(at_s)
 
+    @property
+    def is_enabled(self) -> bool:
+        """A drive reports operation enabled."""
+        return any(node.is_enabled for node in self.nodes.values())
+
     def _on_data(self, at_s: float, cob_id: int, data: bytes) -> Sequence[Event]:
         node_id, function = cob_id & 0x7F, cob_id & 0x780
         if cob_id == SYNC:
@@ -288,15 +293,14 @@ class Network:
         events: list[Event] = []
         if not self.sync.is_lost and self.sync.is_missing(now_s):
             self.sync.is_lost = True
-            level = Level.ALARM if any(node.is_enabled for node in self.nodes.values()) else Level.WARNING
+            level = Level.ALARM if self.is_enabled else Level.WARNING
             events.append(Event(now_s, EventKind.SYNC_LOST, level, "bus", _lost("SYNC", self.sync)))
         for node in self.nodes.values():
             beat = node.heartbeat
             if not beat.is_lost and beat.is_missing(now_s):
                 beat.is_lost = True
                 is_ours = node.node_id in (DRIVER_NODE_ID, WATCHDOG_NODE_ID)
-                powered = any(each.is_enabled for each in self.nodes.values())
-                was_up = powered if is_ours else node.nmt is NmtState.OPERATIONAL
+                was_up = self.is_enabled if is_ours else node.nmt is NmtState.OPERATIONAL
                 who = self._decoder.who(node.node_id)
                 level = Level.ALARM if was_up else Level.WARNING
                 events.append(

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from canbase_driver.supervision.stop_history import NOBODY
+from canbase_driver.runtime.black_box_notes import driver_note
+from canbase_driver.supervision.stop_history import DRIVER, NOBODY
 from canbase_recording.entry import Note
 from canbase_recording.event import Event, EventKind, Level
 from canbase_recording.notes import CommandNote, DriverNote, FilterNote, MuxNote, TitleNote, parse_note
@@ -16,6 +17,7 @@ from canbase_runtime.stop_cause import StopCause
 ORDERED_S: Final = 0.3
 """A motion that was ordered so short before is still under way [s]."""
 STOPPED: Final = (DriverState.STOPPING, DriverState.LATCHED)
+WATCHDOG: Final = "watchdog"
 POWERED: Final = (DriverState.ENABLED, DriverState.STOPPING)
 
 
@@ -31,9 +33,10 @@ class NoteEvents:
         self._filter: FilterNote | None = None
         self._mux: MuxNote | None = None
         self._driver: DriverState | None = None
+        self._title: TitleNote | None = None
 
-    def on_note(self, note: Note) -> Sequence[Event]:
-        """What this note changes."""
+    def on_note(self, note: Note, *, powered: bool = False) -> Sequence[Event]:
+        """What this note changes. `powered`: a drive reports operation enabled."""
         parsed = parse_note(note)
         if isinstance(parsed, CommandNote):
             return self._on_command(parsed)
@@ -42,9 +45,9 @@ class NoteEvents:
         if isinstance(parsed, MuxNote):
             return self._on_mux(parsed)
         if isinstance(parsed, DriverNote):
-            return self._on_driver(parsed)
+            return self._on_driver(parsed, powered=powered)
         if isinstance(parsed, TitleNote):
-            text = _why_written(parsed)
+            self._title, text = parsed, _why_written(parsed)
             return [Event(parsed.at_s, EventKind.TITLE, Level.INFO, "recording", text)]
         return ()
 
@@ -89,13 +92,23 @@ class NoteEvents:
         text = f"follows {note.active}" if note.active else f"no source: {note.detail}"
         return [Event(note.at_s, EventKind.MUX, Level.ALARM if lost else Level.INFO, "velocity_mux", text)]
 
-    def _on_driver(self, note: DriverNote) -> Sequence[Event]:
+    def cut_off(self, ended_s: float) -> Note | None:
+        """The driver's note of the stop for which the recording was written, where the recording ends before it: at
+        standstill a stop is over at once. None: nothing is missing."""
+        title = self._title
+        if title is None or title.stopped_by not in (DRIVER, WATCHDOG) or self._driver in STOPPED:
+            return None
+        return Note(ended_s, driver_note(f"{DriverState.STOPPING.name}: {title.cause} ({title.detail})"))
+
+    def _on_driver(self, note: DriverNote, *, powered: bool) -> Sequence[Event]:
         before, self._driver = self._driver, note.state
         why = f": {note.cause}" if note.cause else ""
         text = f"{note.state.name}{why}{f' ({note.detail})' if note.detail else ''}"
         stops = note.state in STOPPED or (before in POWERED and note.state is not DriverState.ENABLED)
-        level = Level.ALARM if stops else Level.INFO
-        return [Event(note.at_s, EventKind.DRIVER, level, "motor_driver", text)]
+        begins = before is not None or note.state is not DriverState.LATCHED or powered
+        level = Level.ALARM if stops and begins else Level.INFO
+        earlier = "" if begins else " (since before the recording)"
+        return [Event(note.at_s, EventKind.DRIVER, level, "motor_driver", text + earlier)]
 
 
 def _why_written(title: TitleNote) -> str:

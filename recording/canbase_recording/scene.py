@@ -104,8 +104,14 @@ class Scene:
 
     @property
     def tripped_s(self) -> float:
-        """When the watchdog tripped; infinity: it did not."""
-        return next((at_s for at_s, state in self.watchdog if state.state == TRIPPED), math.inf)
+        """When the watchdog tripped, the trip that holds at the reaction or the next one; infinity: it did not."""
+        tripped_s = math.inf
+        for at_s, state in self.watchdog:
+            if state.state == TRIPPED:
+                tripped_s = min(tripped_s, at_s)
+            elif at_s <= self.reaction_s:
+                tripped_s = math.inf
+        return tripped_s
 
     @property
     def drive_nodes(self) -> list[int]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from canbase_recording.scene import SILENT_PERIODS, Scene
-from canbase_recording.trace import AxisTrace, around, between, last_before, value_at, wrapped
+from canbase_recording.trace import AxisTrace, around, last_before, value_at, wrapped
 
 STANDS_SHARE: Final = 0.02
 """Of the greatest speed: slower is at standstill, where no unit is known."""
@@ -32,6 +32,11 @@ class Standstill:
     wheels: tuple[WheelStop, ...]
 
     @property
+    def was_stationary(self) -> bool:
+        """No wheel turned at the cause or later."""
+        return bool(self.wheels) and all(wheel.stood_s == 0.0 for wheel in self.wheels)
+
+    @property
     def stood_s(self) -> float | None:
         """Seconds from the first cause until the last wheel stood."""
         times = [wheel.stood_s for wheel in self.wheels]
@@ -51,20 +56,25 @@ def standstill_of(scene: Scene, since_s: float) -> Standstill:
 
 def _wheel(trace: AxisTrace, scene: Scene, since_s: float) -> WheelStop:
     unit = "m" if trace.has_units else "increments"
-    came = between(trace.position, since_s, scene.ended_s)
-    if not came:
+    times = [at for at, _ in trace.position]
+    last_s = last_before(times, scene.ended_s)
+    if last_s <= since_s and _is_gap(scene, last_s, scene.ended_s):
         return WheelStop(trace.name, None, None, unit, "6064h does not come any more")
-    last_s = last_before([at for at, _ in trace.position], scene.ended_s)
+    if _is_gap(scene, since_s, times[0]):
+        return WheelStop(trace.name, None, None, unit, f"6064h begins at {times[0]:.3f} s")
     if last_s < scene.ended_s - 0.5:
         return WheelStop(trace.name, None, None, unit, f"6064h ends at {last_s:.3f} s")
-    steps = _steps(trace, scene, since_s)
-    moved_s = _last_motion(trace, scene, since_s, steps)
+    from_s = min(since_s, last_s - SILENT_PERIODS * scene.period_s)  # the recording may end with the cause
+    steps = _steps(trace, scene, from_s)
+    moved_s = _last_motion(trace, scene, from_s, steps)
     if moved_s >= last_s:
         return WheelStop(trace.name, None, trace.travel(since_s, last_s), unit, "it still moves at the end")
     gap = next(((a_s, b_s) for a_s, b_s, _ in steps if a_s < moved_s and _is_gap(scene, a_s, b_s)), None)
     if gap is not None:
         return WheelStop(trace.name, None, None, unit, f"6064h is missing from {gap[0]:.3f} to {gap[1]:.3f} s")
-    return WheelStop(trace.name, max(0.0, moved_s - since_s), trace.travel(since_s, moved_s), unit)
+    if moved_s <= since_s:
+        return WheelStop(trace.name, 0.0, 0.0, unit)
+    return WheelStop(trace.name, moved_s - since_s, trace.travel(since_s, moved_s), unit)
 
 
 def _steps(trace: AxisTrace, scene: Scene, since_s: float) -> list[tuple[float, float, float]]:

@@ -130,7 +130,7 @@ def tell(scene: Scene) -> Story:
     seen = [(cause, found) for cause, found in evidence if found is not None and math.isfinite(found.at_s)]
     cause, found = seen[0] if seen else _unknown(scene)
     chain = tuple(event for event in scene.events if event.at_s >= found.at_s - BEFORE_S)
-    caught_by, caught_s, reported = _catcher(scene, chain)
+    caught_by, caught_s, reported = _catcher(scene, chain, found.sender)
     return Story(
         cause=cause,
         found=found,
@@ -148,11 +148,16 @@ BEFORE_S: Final = 0.001
 """A cause and the event that shows it may have one time."""
 
 
-def _catcher(scene: Scene, chain: tuple[Event, ...]) -> tuple[str, float, str]:
-    """The first part that acted, when, and what it gave as its reason. A missing message is noticed before."""
+def _catcher(scene: Scene, chain: tuple[Event, ...], sender: str) -> tuple[str, float, str]:
+    """The first part that acted, when, and what it gave as its reason. A missing message is noticed before.
+
+    `sender`: of the quick stops on the watchdog's PDOs; empty: the watchdog.
+    """
     first = next((event for event in chain if event.level is Level.ALARM and event.kind in CATCHERS), None)
     if first is None:
         return "", math.inf, ""
+    if first.kind is EventKind.WATCHDOG and sender:
+        return sender, first.at_s, first.text
     is_driver = first.kind is EventKind.CONTROL and scene.is_canbase
     who = CATCHERS[EventKind.DRIVER if is_driver else first.kind]
     trips = (event.text for event in chain if event.kind is EventKind.TRIP and event.at_s <= first.at_s + SAYS_S)
@@ -165,7 +170,8 @@ SAYS_S: Final = 0.1
 
 def _unknown(scene: Scene) -> tuple[Cause, Found]:
     """No rule has evidence, and nobody says why."""
-    said = next((event for event in scene.events if event.level is Level.ALARM), None)
+    alarms = (event for event in scene.events if event.level is Level.ALARM)
+    said = next((event for event in alarms if event.at_s >= scene.reaction_s), None)
     if said is None:
         return Cause.UNKNOWN, Found(scene.reaction_s, "nothing in this recording shows what began the stop")
     text = f"it begins with: {said.who} {said.text}; nothing before it shows why"

@@ -16,7 +16,7 @@ from canbase_recording.story import Story, tell
 BEFORE_S: Final = 6.0
 """So much before the first reaction belongs to a stop."""
 QUIET_S: Final = 3.0
-"""A stop is over so long after its last alarm ..."""
+"""A stop is over when each drive that lost its power has it again, or so long after its last alarm ..."""
 LONGEST_S: Final = 15.0
 """... or after this time: what goes on is the next one."""
 SIGNS: Final = frozenset(
@@ -43,6 +43,8 @@ class StoryFinder:
         self._alarm_s = 0.0
         self._acted = False
         """Some part has acted, not only reported."""
+        self._off: dict[str, float] = {}
+        """Axes without power, and since when [s]."""
 
     def on_entry(self, entry: Entry) -> None:
         """The next entry; its events come after it."""
@@ -60,8 +62,12 @@ class StoryFinder:
         while self._began_s is None and self._events and self._events[0].at_s < event.at_s - BEFORE_S:
             self._events.popleft()
         self._events.append(event)
-        if event.level is not Level.ALARM:
-            return
+        if event.level is Level.ALARM:
+            self._on_alarm(event)
+        if event.kind is EventKind.DRIVE_STATE:
+            self._on_drive(event)
+
+    def _on_alarm(self, event: Event) -> None:
         acts = event.kind not in SIGNS
         if acts and not self._acted and self._began_s is not None and event.at_s - self._began_s > SIGN_S:
             self.end(event.at_s)
@@ -69,6 +75,16 @@ class StoryFinder:
             self._began_s, self._acted = event.at_s, False
         self._alarm_s = event.at_s
         self._acted = self._acted or acts
+
+    def _on_drive(self, event: Event) -> None:
+        """A stop ends with the power of the last axis that had lost it."""
+        if not event.text.startswith(DriveState.OPERATION_ENABLED.text):
+            since_s = self._off.get(event.who, event.at_s)
+            self._off[event.who] = event.at_s if event.level is Level.ALARM else since_s
+        elif self._off.pop(event.who, None) is not None and self._began_s is not None:
+            recent_s = self._began_s - SIGN_S
+            if all(off_s < recent_s for off_s in self._off.values()):
+                self.end(event.at_s)
 
     def end(self, at_s: float) -> None:
         """The stop that is open is over, if there is one."""

@@ -232,6 +232,15 @@ class TestEcho:
         frames = [HEARTBEAT[0], RecordedFrame(1.0, 0x80, b"", sent=True), RecordedFrame(1.001, 0x80, b"")]
         assert list(EchoFilter().without(frames)) == frames
 
+    def test_copies_before_the_first_heartbeat_are_taken_away_too(self) -> None:
+        """A recording that begins with them has no second master."""
+        cycles = [
+            RecordedFrame(0.8 + 0.01 * turn + 0.001 * (not sent), 0x80, b"", sent=sent)
+            for turn in range(9) for sent in (True, False)
+        ]  # fmt: skip
+        without = list(EchoFilter().without([*cycles, *HEARTBEAT]))
+        assert without == [*(frame for frame in cycles if frame.sent), HEARTBEAT[0]]
+
     def test_a_late_copy_is_somebody_else_s(self) -> None:
         frames = [RecordedFrame(1.0, 0x201, b"\x0f\x00", sent=True), RecordedFrame(1.2, 0x201, b"\x0f\x00")]
         assert list(EchoFilter().without([*HEARTBEAT, *frames])) == [HEARTBEAT[0], *frames]

@@ -146,6 +146,7 @@ def test_a_part_that_was_killed_is_named_when_its_stop_process_acts_before_it_is
     assert story.cause is cause
     assert story.found.at_s == pytest.approx(last_s)
     assert story.found.text.endswith("and its stop process acts: it was killed, or it crashed")
+    assert story.caught_by == f"the {part.removeprefix('motor_')}'s stop process"
 
 
 @pytest.mark.parametrize(("lost_s", "cause"), [(0.999, Cause.SOURCE_LOST), (1.004, Cause.STOP_REQUESTED)])
