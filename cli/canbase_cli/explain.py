@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config, with_cursor
 
 if TYPE_CHECKING:
@@ -92,8 +91,6 @@ def explain(
     except EdsError as error:
         fail(f"--eds: {error}", WRONG_INPUT)
     _print(facts, explanation, as_json=as_json)
-    if not as_json:
-        _name_trip_file(recording)
     if html is not None and make_page is not None:
         try:
             html.write_text(make_page(facts, explanation), encoding="utf-8")
@@ -127,23 +124,6 @@ def _print(facts: RecordingFacts, explanation: Explanation, *, as_json: bool) ->
 
     for line in text_lines(facts, explanation):
         typer.echo(line)
-
-
-def _name_trip_file(recording: Path) -> None:
-    """What the watchdog itself recorded of this stop: a watchdog that hung is seen there alone."""
-    from canbase_recording.input_lines import NoInputsError
-    from canbase_recording.replay_file import trip_beside
-    from canbase_recording.stop_file import read_stop
-
-    try:
-        beside = trip_beside(recording, read_stop(recording))
-    except NoInputsError:
-        return
-    if beside is not None:
-        name, inputs = beside
-        detail = printable(inputs.head.trip.detail, SENTENCE_LENGTH)
-        typer.echo(f"\nThe watchdog recorded a trip of its own: {detail}. To see it:")
-        typer.echo(f"  canbase record replay {printable(str(recording.with_name(name)), SENTENCE_LENGTH)}")
 
 
 def _page_maker() -> Callable[[RecordingFacts, Explanation], str]:

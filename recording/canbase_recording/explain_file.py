@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -9,10 +10,14 @@ from typing import Final
 
 from canbase_config.eds_file import Eds, read_eds
 from canbase_config.robot import Robot
+from canbase_driver.supervision.watchdog_link import CAUSES
 from canbase_recording.entry import Entry
 from canbase_recording.explanation import Explanation, explain
-from canbase_recording.recording_facts import RecordingFacts
+from canbase_recording.input_lines import NoInputsError
+from canbase_recording.recording_facts import OwnTrip, RecordingFacts
 from canbase_recording.recording_file import NoRecordingError, RecordingFile
+from canbase_recording.replay_file import trip_head_beside
+from canbase_recording.stop_file import read_stop
 
 LOOK_EVERY: Final = 20_000
 """Entries between two reports of progress."""
@@ -40,7 +45,27 @@ def explain_file(
         if not told.frames:
             raise NoRecordingError(f"{path}: {recording.format}, and no frame in it{_why(recording)}")
         problems = tuple(recording.problems.sentences)
-        return RecordingFacts(path.name, recording.format, recording.began_text, config, problems), told
+    trip = _own_trip(path, robot, known, bitrate)
+    return RecordingFacts(path.name, recording.format, recording.began_text, config, problems, trip), told
+
+
+def _own_trip(path: Path, robot: Robot | None, known: Sequence[Eds], bitrate: int | None) -> OwnTrip | None:
+    """What the watchdog recorded of the stop of a black box; None: nothing that is beside it."""
+    if path.suffix != ".asc" or not path.with_suffix(".json").is_file():
+        return None
+    try:
+        stop = read_stop(path)
+    except NoInputsError:
+        return None
+    found = trip_head_beside(path, stop)
+    if found is None:
+        return None
+    file, trip = path.with_name(found[0]), found[1].trip
+    at_s, told = trip.at_s - stop.began_s, None
+    if at_s < 0.0:
+        with contextlib.suppress(NoRecordingError), RecordingFile(file) as recording:
+            told = explain(recording.entries(), robot, known, bitrate)
+    return OwnTrip(str(file), trip.detail or CAUSES.get(trip.cause, "unknown cause"), at_s, told)
 
 
 def known_objects(eds_files: Sequence[Path]) -> list[Eds]:

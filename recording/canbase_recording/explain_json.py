@@ -9,7 +9,7 @@ from canbase_recording.event import Event
 from canbase_recording.explain_text import gaps, node_facts
 from canbase_recording.explanation import Explanation
 from canbase_recording.frame_words import pdo_sources
-from canbase_recording.recording_facts import RecordingFacts
+from canbase_recording.recording_facts import OwnTrip, RecordingFacts
 from canbase_recording.story import Story
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, printable
 
@@ -21,10 +21,16 @@ def as_json(facts: RecordingFacts, told: Explanation) -> dict[str, Any]:
             "file": facts.file, "format": facts.format, "began": facts.began, "config": facts.config,
             "problems": list(facts.problems), "frames": told.frames, "notes": told.notes, "seconds": told.ended_s,
             "stops": [_story(story) for story in told.stories], "further_stops": told.further_stops,
+            "watchdog": facts.trip and _own_trip(facts.trip),
             "network": _network(told), "events": [_event(event) for event in told.events],
         }
     )  # fmt: skip
     return found
+
+
+def _own_trip(trip: OwnTrip) -> dict[str, Any]:
+    stories = trip.told.stories if trip.told else ()
+    return {"file": trip.path, "detail": trip.detail, "at_s": trip.at_s, "stops": [_story(story) for story in stories]}
 
 
 def _story(story: Story) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from canbase_recording.frame_words import pdo_sources
 from canbase_recording.html_page import Html, data, escaped, row, section, table, tag, terms
 from canbase_recording.kind import Kind
 from canbase_recording.lease_bounds import Bounds
-from canbase_recording.recording_facts import RecordingFacts
+from canbase_recording.recording_facts import OwnTrip, RecordingFacts
 from canbase_recording.story import Story
 
 COLOURS: Final = ("#3b82c4", "#d97b29", "#3aa06b", "#b3528f", "#8a6fd1", "#a58a1e", "#2aa3a3", "#c0504d")
@@ -32,11 +32,18 @@ def page(facts: RecordingFacts, told: Explanation) -> str:
     """The whole page."""
     return html_page.page(
         f"canbase explain: {facts.file}",
-        [tag("p", facts.sentence(told), class_="soft"), *_warnings(facts.problems)],
+        [tag("p", facts.sentence(told), class_="soft"), *_warnings(facts.problems), *_own_trip(facts.trip)],
         [*_stops(told), _network(told)],
         library=get_plotlyjs(),
         script=(files("canbase_recording") / "explain_page.js").read_text(encoding="utf-8"),
     )
+
+
+def _own_trip(trip: OwnTrip | None) -> Iterator[Html]:
+    """What the watchdog recorded before this recording begins."""
+    if trip is not None and trip.told is not None:
+        yield tag("p", trip.sentence)
+        yield from (tag("p", f"{each.cause.value}: {each.found.text}") for each in trip.told.stories)
 
 
 def _warnings(lines: Iterable[str]) -> Iterator[Html]:

@@ -31,6 +31,11 @@ def _lines(facts: RecordingFacts, told: Explanation) -> Iterator[str]:
     yield facts.sentence(told)
     for problem in facts.problems:
         yield f"  warning: {problem}"
+    if facts.trip is not None and facts.trip.told is not None:
+        yield from ("", facts.trip.sentence)
+        for number, story in enumerate(facts.trip.told.stories, start=1):
+            yield from _story(number, len(facts.trip.told.stories), story)
+        yield from ("", f"What the driver recorded then, {facts.file}:")
     for number, story in enumerate(told.stories, start=1):
         yield ""
         yield from _story(number, len(told.stories), story)
@@ -42,6 +47,9 @@ def _lines(facts: RecordingFacts, told: Explanation) -> Iterator[str]:
         yield from (f"  {line}" for line in ending(told))
     yield ""
     yield from _network(told)
+    if facts.trip is not None:
+        yield from ("", facts.trip.sentence) if facts.trip.told is None else ("",)
+        yield from ("To see what the watchdog decided:", f"  canbase record replay {facts.trip.path}")
 
 
 def ending(told: Explanation) -> list[str]:

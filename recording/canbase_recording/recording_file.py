@@ -10,6 +10,7 @@ import contextlib
 import json
 import math
 import re
+import struct
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -20,11 +21,18 @@ from typing import Any, Final
 
 import can
 
+from canbase_driver.supervision.watchdog_link import (
+    LEASE_AGE_UNKNOWN,
+    STATE_COB_ID,
+    STATE_LAYOUT,
+    TRIPPED,
+    WATCHING,
+)
 from canbase_recording import foreign_reader
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.text_lines import TextLines
 
-_BROKEN: Final = (ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError)
+_BROKEN: Final = (ValueError, IndexError, KeyError, TypeError, OverflowError, RecursionError, struct.error)
 """What a line of a watchdog raises that is none."""
 CLOCK_STEP_S: Final = 0.1
 """A frame that is older than the one before by more: the clock was set back. By less: it was written out of order."""
@@ -216,8 +224,9 @@ class RecordingFile:
                 yield message
 
     def _inputs(self) -> Iterator[can.Message]:
-        """The frames that a watchdog received: of a stop in which the driver died with its own recording."""
-        offset_s = 0.0
+        """The frames that a watchdog received: of a stop in which the driver died with its own recording. Its verdicts
+        are its state frames: on most buses it does not receive its own."""
+        offset_s, leased_s = 0.0, math.nan
         while line := self._file.readline(LINE_BYTES):
             if not line.endswith(b"\n"):
                 self.problems.truncated = "its last line is cut off"
@@ -226,6 +235,16 @@ class RecordingFile:
                 told = json.loads(line)
                 if isinstance(told, dict):
                     offset_s = float(told["wall_offset_s"])
+                elif told[0] == "lease":
+                    leased_s = float(told[1])
+                elif told[0] == "verdict":
+                    _, at_s, cause, node_id, _ = told
+                    yield can.Message(
+                        offset_s + at_s,
+                        STATE_COB_ID,
+                        is_extended_id=False,
+                        data=_state(cause, node_id, at_s - leased_s),
+                    )
                 elif told[0] == "frame":
                     _, at_s, cob_id, data = told
                     yield can.Message(
@@ -279,6 +298,12 @@ class RecordingFile:
         else:
             self.problems.broken += 1
         return self._last_s
+
+
+def _state(cause: int, node_id: int, lease_s: float) -> bytes:
+    """The watchdog's state frame for a verdict: tripped, or without a cause watching."""
+    lease_ms = LEASE_AGE_UNKNOWN if math.isnan(lease_s) else min(round(1000.0 * lease_s), LEASE_AGE_UNKNOWN)
+    return STATE_LAYOUT.pack(TRIPPED if cause else WATCHING, cause, 0, node_id, lease_ms, 0, 0)
 
 
 MOST_CHANNELS: Final = 100

@@ -10,8 +10,8 @@ from canbase_driver.supervision.watchdog_link import CAUSES
 from canbase_recording.replay_compare import Comparison, Difference
 from canbase_recording.replay_trip import Replayed, Trip, WatchdogReplay
 
-NO_WATCHDOG: Final = "watchdog: cannot tell, since its file watchdog_….jsonl (one for each trip) is not beside it"
-NO_VELOCITY: Final = "mux and filter: cannot tell, since their file velocity_….jsonl is not beside it"
+NO_WATCHDOG: Final = "watchdog: cannot tell, since no file watchdog_….jsonl of this stop is beside it"
+NO_VELOCITY: Final = "mux and filter: cannot tell, since no file velocity_….jsonl of this stop is beside it"
 
 
 class Begun(Protocol):

@@ -9,7 +9,7 @@ import copy
 import json
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -18,6 +18,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from canbase_config.robot import Robot
 from canbase_config.watchdog import WatchdogConfig
 from canbase_recording.input_lines import NoInputsError, Time, first_of
+from canbase_runtime.driver_state import DriverState
 
 MOST_BYTES: Final = 64_000_000
 """canbase writes a few MB."""
@@ -44,6 +45,18 @@ class StopFile:
     profiles: dict[str, str]
     watchdog: _Watchdog
     versions: dict[str, str]
+    events: list[dict[str, Any]] = field(default_factory=list)
+    """Commands and states, with their times (`at_s`)."""
+
+    def was_enabled(self, since_s: float, until_s: float) -> bool:
+        """The driver enabled its drives between these times."""
+        return any(
+            event.get("what") == "motor_driver/state"
+            and event.get("state") == DriverState.ENABLED.name
+            and isinstance(event.get("at_s"), float)
+            and since_s < event["at_s"] <= until_s
+            for event in self.events
+        )
 
     @property
     def robot(self) -> Robot:

@@ -165,8 +165,8 @@ def test_without_the_files_of_the_parts_it_cannot_tell_what_they_decided(recorde
         (tmp_path / f"alone{suffix}").write_bytes(recorded.with_suffix(suffix).read_bytes())
     code, output = replay(tmp_path / "alone.asc")
     assert code == 1
-    assert "watchdog: cannot tell, since its file" in output
-    assert "mux and filter: cannot tell, since their file" in output
+    assert "watchdog: cannot tell, since no file" in output
+    assert "mux and filter: cannot tell, since no file" in output
     told = json.loads(replay(tmp_path / "alone.asc", "--json")[1])
     assert ("watchdog" in told, "velocity" in told, len(told["not_replayed"])) == (False, False, 2)
 

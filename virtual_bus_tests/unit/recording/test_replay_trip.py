@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime, timezone
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -140,6 +142,84 @@ def test_the_file_of_another_stop_is_not_taken(folder: Path) -> None:
     assert trip_beside(stop, replace(inputs, began_s=inputs.began_s + 500.0, at_s=inputs.at_s + 500.0)) is None
     assert trip_beside(stop, replace(inputs, wall_offset_s=inputs.wall_offset_s + 86_400.0)) is None
     assert trip_beside(stop, replace(inputs, robot_yaml={"name": "another"})) is None
+
+
+HUNG_S = 16.0
+
+
+@pytest.fixture
+def hung(folder: Path, tmp_path: Path) -> Path:
+    """The .asc of a driver that hung for 16 s: it begins with its stop, and the watchdog's trip was long before."""
+    of = folder / "driver_hangs"
+    trip = read_trip(of / "watchdog_driver_hangs_0.jsonl").head.trip
+    for file in of.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    values = json.loads((of / "driver_hangs.json").read_text()) | {
+        "began_s": trip.at_s + HUNG_S, "at_s": trip.at_s + HUNG_S + 0.01, "events": [],
+        "stopped_by": "watchdog", "cause": "watchdog tripped", "detail": "watchdog: driver silent",
+    }  # fmt: skip
+    (tmp_path / "driver_hangs.json").write_text(json.dumps(values))
+    return tmp_path / "driver_hangs.asc"
+
+
+def test_the_watchdog_s_file_explains_the_stop_of_a_driver_that_hung_for_long(hung: Path) -> None:
+    output = CliRunner().invoke(app, ["explain", str(hung)]).output
+    assert "16.0 s before this recording begins, the watchdog tripped: driver's heartbeat is " in output
+    begin = output.index("before this recording")
+    assert output.index("first cause:  driver or master silent") > begin
+    assert output.index("What the driver recorded then") > output.index("caught by:    watchdog, ") > begin
+    assert f"canbase record replay {hung.parent}/watchdog_driver_hangs_0.jsonl" in output
+    values = json.loads(CliRunner().invoke(app, ["explain", "--json", str(hung)]).output)["watchdog"]
+    assert values["at_s"] == pytest.approx(-HUNG_S, abs=0.001)
+    assert [stop["cause"] for stop in values["stops"]] == ["driver or master silent"]
+    _, output = run(hung)
+    assert "of its own file watchdog_driver_hangs_0.jsonl" in output
+    assert "the same cause, in the same tick" in output
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"stopped_by": "motor_driver"},
+        {"detail": "watchdog: drive silent, node 1"},
+        {"began_s": -5.0},
+        {"wall_offset_s": 5.0},
+        {"events": [{"at_s": -3.0, "what": "motor_driver/state", "state": "ENABLED"}]},
+    ],
+    ids=["another part", "another trip", "it ran before", "another start of the computer", "reset since"],
+)
+def test_a_trip_before_the_recording_is_another_stop_s_unless_all_agrees(hung: Path, change: dict[str, Any]) -> None:
+    values = json.loads(hung.with_suffix(".json").read_text())
+    for key, value in change.items():
+        values[key] = values[key] + value if isinstance(value, float) else value
+    for event in values["events"]:
+        event["at_s"] += values["at_s"]
+    hung.with_suffix(".json").write_text(json.dumps(values))
+    assert trip_beside(hung, read_stop(hung)) is None
+    assert "the watchdog tripped: driver's heartbeat" not in CliRunner().invoke(app, ["explain", str(hung)]).output
+
+
+@pytest.mark.parametrize("name", ["watchdog_a_0.jsonl", "watchdog_z_0.jsonl"])
+def test_a_later_trip_of_another_cause_ends_the_search(hung: Path, name: str) -> None:
+    """The driver's stop was for the last trip before it, and that one is not this."""
+    head, *lines = hung.with_name("watchdog_driver_hangs_0.jsonl").read_text().splitlines()
+    values = json.loads(head)
+    values["trip"] |= {"at_s": values["trip"]["at_s"] + 5.0, "cause": int(TripCause.LEASE_LOST)}
+    hung.with_name(name).write_text("\n".join((json.dumps(values), *lines)) + "\n")
+    assert trip_beside(hung, read_stop(hung)) is None
+
+
+def test_a_trip_after_a_stop_belongs_to_the_stop_that_is_nearer(folder: Path, tmp_path: Path) -> None:
+    for file in (folder / "watchdog_hangs").iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    path = tmp_path / "watchdog_hangs.asc"
+    inputs, trip = read_stop(path), read_trip(tmp_path / "watchdog_watchdog_hangs_0.jsonl").head.trip
+    stop = replace(inputs, began_s=trip.at_s - 12.0, at_s=trip.at_s - 4.0)
+    assert trip_beside(path, stop) is not None
+    wall = datetime.fromtimestamp(trip.at_s + 1.0 + stop.wall_offset_s, tz=timezone.utc)
+    name = f"stop_{stop.robot_yaml['name']}_{wall:%Y%m%dT%H%M%S}.000Z_watchdog_tripped.asc"
+    (tmp_path / name).write_text("")
+    assert trip_beside(path, stop) is None
 
 
 def _changed(number: int, text: str) -> Callable[[list[str]], list[str]]:
