@@ -218,7 +218,7 @@ class Robot(Section):
     def bus_arguments(self) -> dict[str, Any]:
         """Keyword arguments for `can.Bus` of the driver and the watchdog. On SocketCAN the kernel passes the frames of
         this robot alone, so that a sensor on the same bus wakes neither: broadcast ones (NMT, SYNC), and all 11-bit
-        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.5), and
+        identifiers whose lower seven bits are the node id of a drive, the driver or the watchdog (CiA 301, 7.3.3), and
         LSS requests. None is a remote frame: those are requests of the watchdog to drives.
         """
         if self.bus.interface != "socketcan":

@@ -1,5 +1,6 @@
 """From drives as they come out of their boxes to drives with node ids and a bit rate of their own: the steps. Pure.
 
+0. `require_lss`: what can be known while each drive still has its node id is known before they are taken away.
 1. `discover`: every drive loses its node id until its next power cycle, and fastscan finds them one after the other.
    What drives answer meanwhile is the same for all of them, so two with one node id do not disturb each other. A drive
    that was found gets a node id for the time being: so it leaves the scan.
@@ -12,13 +13,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from canbase_commissioning.census import ALL, Census, read, require_no_power, take_census
 from canbase_commissioning.conversation import ConversationError, Exchange, Progress, Talk, say
 from canbase_commissioning.lss import master, protocol
 from canbase_commissioning.lss.fastscan import WAITS_S, scan_for_all
-from canbase_commissioning.lss.protocol import IDENTIFIED, SET_NODE_ID, UNCONFIGURED, Identity, is_answer
+from canbase_commissioning.lss.protocol import IDENTIFIED, SELECTED, SET_NODE_ID, UNCONFIGURED, Identity, is_answer
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import ALL_NODES, NmtCommand, nmt, parse_heartbeat
 
@@ -44,6 +46,27 @@ def is_anybody_here(bitrate: int) -> Talk[bool]:
     return (yield from _unconfigured(WAITS_S[1]))
 
 
+def require_lss(census: Census) -> Talk[None]:
+    """Each drive whose identity is known answers its selection, and keeps its node id. Raises ConversationError."""
+    mute = []
+    for node_id, identity in census.identities.items():
+        for _ in range(master.ATTEMPTS):
+            yield say(protocol.switch_all(configuration=False), wait_s=master.SETTLE_S)
+            if (yield Exchange(protocol.select(identity), is_answer(SELECTED), master.WAIT_S)):
+                break
+        else:
+            mute.append(node_id)
+    if mute:
+        raise ConversationError(NO_LSS if len(mute) == len(census.node_ids) else _without_lss(mute))
+
+
+def _without_lss(node_ids: Iterable[int]) -> str:
+    return (
+        f"node {', '.join(map(str, node_ids))} answers SDO and takes no LSS: disconnect it, and set it by its switches "
+        "or its manufacturer's tool"
+    )
+
+
 def discover(census: Census, bitrate: int) -> Talk[list[Identity]]:
     """Every drive that speaks LSS, by identity. Raises ConversationError for none, or for drives that are not found."""
     yield Progress("drives without a node id", 0, 1)
@@ -56,10 +79,7 @@ def discover(census: Census, bitrate: int) -> Talk[list[Identity]]:
     yield say(protocol.switch_all(configuration=False), wait_s=master.SETTLE_S)
     remaining = yield from read(census.node_ids, 0x1000, 0, bitrate, attempts=1)
     if remaining:
-        raise ConversationError(
-            f"node {', '.join(map(str, remaining))} answers SDO and takes no LSS: disconnect it, and set it by its "
-            f"switches or its manufacturer's tool. Found: {', '.join(map(str, found)) or 'none'}"
-        )
+        raise ConversationError(f"{_without_lss(remaining)}. Found: {', '.join(map(str, found)) or 'none'}")
     if not found:
         raise ConversationError(NO_LSS)
     return found

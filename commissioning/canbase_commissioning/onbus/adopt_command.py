@@ -16,7 +16,7 @@ from canbase_commissioning.census import Census, require_no_power
 from canbase_commissioning.conversation import Conversation, ConversationError, Talk, say
 from canbase_commissioning.guide import Ask, CommissionError, Tell
 from canbase_commissioning.lss import bit_rate_search, master, protocol
-from canbase_commissioning.lss.adoption import discover, is_anybody_here, look, take_into_use
+from canbase_commissioning.lss.adoption import discover, is_anybody_here, look, require_lss, take_into_use
 from canbase_commissioning.lss.assignment import check_node_id, proposals, too_few, too_many
 from canbase_commissioning.lss.bit_rate_search import Heard
 from canbase_commissioning.lss.protocol import Identity
@@ -177,8 +177,11 @@ def _discover_and_assign(adoption: Adoption, bitrate: int) -> dict[Identity, int
         )
     for text in described(census):
         adoption.tell(text)
+    if surplus := too_many(sorted(census.identities.values()), adoption.robot):
+        raise ConversationError(surplus)
     adoption.ask(Ask("start", SAFE, confirms=True))
     adoption.talk(require_no_power(census.node_ids, bitrate))  # the person may have taken long
+    adoption.talk(require_lss(census))
     adoption.left = UNSTORED
     found = adoption.talk(discover(census, bitrate))
     if surplus := too_many(found, adoption.robot):

@@ -21,15 +21,14 @@ COB_ID, TYPE, INHIBIT, EVENT = 1, 2, 3, 5
 MAX_SYNC_TYPE = 240
 """Transmission types 0–240 are synchronous, 254 and 255 event-driven, the rest is not used."""
 RESERVED_IDS = (
-    range(0x081),
+    range(0x080),
     range(0x101, 0x181),
     range(0x581, 0x600),
     range(0x601, 0x680),
     range(0x6E0, 0x700),
-    range(0x701, 0x780),
-    range(0x7E4, 0x7E6),
+    range(0x701, 0x800),
 )
-"""Identifiers that no PDO may have (CiA 301, restricted CAN-IDs)."""
+"""Identifiers that no PDO may have (CiA 301, 7.3.5; SYNC's 080h is not among them)."""
 
 
 @dataclass(frozen=True, slots=True)

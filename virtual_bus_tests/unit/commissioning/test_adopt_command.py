@@ -59,3 +59,19 @@ def test_a_bit_rate_that_canopen_does_not_have_is_2() -> None:
     done = canbase("bus", "adopt", "--channel", "can0", "--bitrate", "123456")
     assert done.exit_code == 2
     assert "expected one of 1000000" in done.stderr
+
+
+def test_one_drive_too_many_and_one_without_lss_end_it_before_any_node_id_is_taken(world: CommandWorld) -> None:
+    second = world.bench.nodes[2]
+    second.lss.on_frame = lambda data, now_s: None  # type: ignore[method-assign]
+    second._route()
+    done = world.canbase("bus", "adopt", "--yes", "--present-bitrate", "500000")
+    assert done.exit_code == 1
+    assert "node 2 answers SDO and takes no LSS" in done.stderr
+    assert "Nothing was changed" in done.stderr
+    text = world.config.read_text(encoding="utf-8")
+    world.config.write_text(text.replace("  node_id: 2", "  node_id: 1\n  axis: 1"), encoding="utf-8")
+    done = world.canbase("bus", "adopt", "--yes", "--present-bitrate", "500000")
+    assert "robot.yaml has 1 nodes, 2 found" in done.stderr
+    assert "Nothing was changed" in done.stderr
+    assert settings(world) == [(1, 500_000), (2, 500_000)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from canbase_commissioning.census import require_no_power, take_census
 from canbase_commissioning.lss import master
-from canbase_commissioning.lss.adoption import discover, is_anybody_here, look, take_into_use
+from canbase_commissioning.lss.adoption import discover, is_anybody_here, look, require_lss, take_into_use
 from canbase_commissioning.lss.protocol import Identity
 from canbase_sim.cia301.dictionary import key
 from canbase_sim.cia402.states import POWERED, State
@@ -130,7 +130,19 @@ def test_a_third_drive_that_speaks_no_lss_is_named() -> None:
     world.nodes[1]._route()
     census = world.talk(look(500_000))
     assert census.identities == {1: FIRST, 2: SECOND}
+    assert world.why(require_lss(census)).startswith("node 2 answers SDO and takes no LSS")
+    assert world.settings == [(1, 500_000), (2, 500_000)]
     assert "node 2 answers SDO and takes no LSS" in world.why(discover(census, 500_000))
+
+
+def test_drives_that_take_lss_keep_their_node_ids_while_they_are_counted() -> None:
+    world = RatedWorld(factory_fresh=False, bitrate=500_000)
+    world.talk(require_lss(world.talk(look(500_000))))
+    assert world.settings == [(1, 500_000), (2, 500_000)]
+    for node in world.nodes:
+        node.lss.on_frame = lambda data, now_s: None  # type: ignore[method-assign]
+        node._route()
+    assert world.why(require_lss(world.talk(look(500_000)))).startswith("no drive answers LSS")
 
 
 def test_drives_without_lss_are_told_from_an_empty_bus() -> None:

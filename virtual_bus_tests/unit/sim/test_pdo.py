@@ -102,11 +102,22 @@ def test_refusals(index: int, sub: int, value: int, code: str) -> None:
     assert Rig().write(index, value, sub=sub) == code
 
 
-@pytest.mark.parametrize("cob_id", [0x000, 0x001, 0x080, 0x101, 0x180, 0x581, 0x600 + 1, 0x6E0, 0x701, 0x77F])
-def test_reserved_identifiers_are_refused(cob_id: int) -> None:
-    rig = Rig()
-    rig.write(0x1400, OFF | 0x201, sub=1)
-    assert rig.write(0x1400, cob_id, sub=1) == "06090030"
+@pytest.mark.parametrize(
+    ("cob_ids", "answer"),
+    [
+        (
+            (0x000, 0x001, 0x07F, 0x101, 0x180, 0x581, 0x601, 0x67F, 0x6E0, 0x701, 0x780, 0x7E3, 0x7E6, 0x7FF),
+            "06090030",
+        ),
+        ((0x080, 0x100, 0x181, 0x580, 0x600, 0x680, 0x6DF, 0x700), "ok"),
+    ],
+)
+def test_restricted_identifiers_alone_are_refused(cob_ids: tuple[int, ...], answer: str) -> None:
+    """CiA 301, 7.3.5."""
+    for cob_id in cob_ids:
+        rig = Rig()
+        rig.write(0x1400, OFF | 0x201, sub=1)
+        assert rig.write(0x1400, cob_id, sub=1) == answer, f"{cob_id:03X}h"
 
 
 def test_entries_change_only_while_sub_0_is_0() -> None:
