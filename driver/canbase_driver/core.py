@@ -96,7 +96,7 @@ class DriverCore:
         self._needs_proof = robot.safety.require_self_stop and not robot.bus.is_virtual
         self._unproven = without_proof(robot) if self._needs_proof else ""
         self._reset = ResetRun(self._watchdog, self._period_s, robot.timeouts.boot_s)
-        self._bus_problem = ""
+        self._bus_problem = self._clue = ""
         self._stop_requested = self._shutdown_requested = False
         self._heartbeat_at = self._ticked_at = -math.inf
         self._sync_since = -math.inf
@@ -325,6 +325,10 @@ class DriverCore:
             if stalling := drives.stalling(liar):
                 watchdog_detail = f"{watchdog_detail}; {stalling}"
             drives.doubt(liar, f"reports implausible values (watchdog: {watchdog_detail})")
+        if watchdog is not WatchdogView.TRIPPED:
+            self._clue = ""
+        elif clue := self._clue or drives.contradiction(liar) or drives.unshown_mode(liar):
+            self._clue, watchdog_detail = clue, f"{watchdog_detail}; {clue}"
         measured_mps = abs(drives.fastest().velocity_mps)
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._track_m)
         ordered_mps = max(abs(left_mps), abs(right_mps))

@@ -28,6 +28,13 @@ NEEDS_A_CURE = {
     "guarding_alone",
     "one_tpdo",
     "other_unit",
+    "long_tpdo",
+    "fixed_mapping",
+    "counted_syncs",
+    "late_mode",
+    "other_counts",
+    "short_range",
+    "reversed_velocity",
 }
 UNUSABLE = {"synchronous_alone", "wide_status"}
 TOGETHER = range(8)

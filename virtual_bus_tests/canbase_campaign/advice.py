@@ -16,9 +16,9 @@ _OBJECT = re.compile(r"\b([1-9A-F][0-9A-F]{3})h\b")
 _NODE = re.compile(r"\bnode (\d+)\b")
 _LITERAL = re.compile(r"`([a-z_]+(?:\.[a-z_0-9]+)*): ([^`]+)`")
 _KEY = re.compile(r"\b[a-z_]+(?:\.[a-z_0-9]+)+\b")
-_MODE = re.compile(r"`mode`")
 OF_A_DRIVE = ("mode", "velocity_unit", "counts_per_motor_rev")
 """Keys of robot.yaml below `drives` that a message may name."""
+_BARE = re.compile(rf"`({'|'.join(OF_A_DRIVE)})`")
 MAKERS_TOOL, UNUSABLE = "manufacturer's tool", "cannot be used"
 WITHOUT_OBJECT = ("boot-up message", "SDO requests", "SDO transfers", "NMT reset")
 """What a message may be about that has no object."""
@@ -52,7 +52,7 @@ class Advice:
 def read_advice(text: str) -> Advice:
     """What the message says."""
     keys: dict[str, Any] = {key: None for key in _KEY.findall(text) if is_key(key)}
-    keys |= {"mode": None} if _MODE.search(text) else {}
+    keys |= dict.fromkeys(_BARE.findall(text))
     keys |= {key: _value(value) for key, value in _LITERAL.findall(text) if is_key(key) or key in OF_A_DRIVE}
     objects = tuple(dict.fromkeys(int(index, 16) for index in _OBJECT.findall(text)))
     return Advice(text, tuple(dict.fromkeys(map(int, _NODE.findall(text)))), objects, keys)

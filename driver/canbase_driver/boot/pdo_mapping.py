@@ -325,7 +325,7 @@ def _map(node: NodeAccess, pdo: Pdo, mapped: int) -> Steps[None]:
             yield Write(pdo.mapping_object, sub, entry, 4)
         except SdoAborted as refused:
             yield from _look_for_width(node, pdo, sub, refused)
-            raise _unmapped(node, pdo, sub, _named(entry), refused) from refused
+            raise (yield from _unmapped(node, pdo, sub, _named(entry), refused)) from refused
     yield from _write_count(node, pdo, len(pdo.mapping))
     if not (yield from (_holds(pdo) if pdo.is_received else _is_mapped(pdo))):
         problem = f"{pdo.name} reads back another mapping than was written to {pdo.mapping_object:04X}h"
@@ -338,13 +338,20 @@ def _write_count(node: NodeAccess, pdo: Pdo, count: int) -> Steps[None]:
     try:
         yield Write(pdo.mapping_object, 0, count, 1)
     except SdoAborted as refused:
-        raise _unmapped(node, pdo, 0, "another mapping", refused) from refused
+        raise (yield from _unmapped(node, pdo, 0, "another mapping", refused)) from refused
 
 
-def _unmapped(node: NodeAccess, pdo: Pdo, sub: int, what: str, refused: SdoAborted) -> BootError:
-    """The drive does not take `what` into this PDO."""
+def _unmapped(node: NodeAccess, pdo: Pdo, sub: int, what: str, refused: SdoAborted) -> Steps[BootError]:
+    """The drive does not take `what` into this PDO. It may carry what is needed already, and something more."""
     problem = f"{pdo.name} does not take {what} ({pdo.mapping_object:04X}h:{sub}: {refused.text})"
-    tool = f"Let {pdo.name} carry {_needed(pdo)} with the manufacturer's tool; {ELSE_UNUSABLE}"
+    carried = []
+    for n in range(1, ((yield from node.read_if_present(pdo.mapping_object)) or 0) + 1):
+        carried.append(_named((yield from node.read_if_present(pdo.mapping_object, n)) or 0))
+    now = f"; it carries {', '.join(carried)}" if carried else ""
+    tool = (
+        f"Let {pdo.name} carry {_needed(pdo)} in this order and nothing else, with the manufacturer's tool{now}; "
+        f"{ELSE_UNUSABLE}"
+    )
     return BootError.refused(node.node_id, problem, refused.code, tool)
 
 

@@ -11,12 +11,17 @@ from canbase_config.scale_objects import RATIOS, SCALE_OBJECTS, Expected
 from canbase_driver.boot.steps import BootError, NodeAccess, Steps, unsigned
 from canbase_driver.cia301.sdo_client import Read, SdoAborted
 
+POSITION_RANGE = 0x607B
+LEAST_TURNS = 1000.0
+"""A range of 6064h of fewer revolutions of the wheel is refused: some hundred metres."""
+
 
 def check_scale(node: NodeAccess, drive: Drive, *, identify: bool) -> Steps[tuple[Expected, ...]]:
     """The units that the drive reports. Raises BootError for one that contradicts `expects`, or else robot.yaml.
 
     `identify`: read all of SCALE_OBJECTS, not just those that can contradict robot.yaml.
     """
+    yield from _check_range(node, drive)
     scale = yield from read_scale(drive, SCALE_OBJECTS if identify else REPORTED)
     yield from check_expected(node, drive)
     offset = _offset(drive)
@@ -33,6 +38,29 @@ def check_scale(node: NodeAccess, drive: Drive, *, identify: bool) -> Steps[tupl
             "counts_per_motor_rev fit; canbase setup commission --steps directions,scale shows it"
         )
     return scale
+
+
+def _check_range(node: NodeAccess, drive: Drive) -> Steps[None]:
+    """607Bh: a position that wraps there looks like a jump. Raises BootError for so short a way that goals fail by it;
+    a longer one is a note."""
+    index, limits = POSITION_RANGE + _offset(drive), []
+    for sub in (1, 2):
+        try:
+            limits.append(int.from_bytes((yield Read(index, sub)), "little", signed=True))
+        except SdoAborted:
+            return
+    width = limits[1] - limits[0] + 1
+    if not 1 < width < 1 << 32:
+        return
+    turns = float(f"{width / drive.counts_per_motor_rev / drive.gear_ratio:.3g}")
+    problem = (
+        f"{index:04X}h lets 6064h of {drive.joint} wrap between {limits[0]} and {limits[1]}, each {turns:g} "
+        "revolutions of the wheel, and the pose of the odometry is reset there"
+    )
+    tool = f"set {index:04X}h:1 to -2147483648 and {index:04X}h:2 to 2147483647 with the manufacturer's tool"
+    if turns < LEAST_TURNS:
+        raise BootError(node.node_id, problem, f"The whole range of 6064h: {tool}")
+    node.notes.append(f"{problem}: {tool}")
 
 
 def check_expected(node: NodeAccess, drive: Drive) -> Steps[None]:

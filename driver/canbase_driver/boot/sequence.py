@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from canbase_config.drive import Drive, Identity
 from canbase_config.object_map import CONTROLWORD, PROFILE_402, STATUSWORD, VELOCITY_ACTUAL, place
@@ -43,7 +44,7 @@ from canbase_driver.boot.steps import (
 )
 from canbase_driver.cia301.nmt import NmtCommand
 from canbase_driver.cia301.pdo import node_layout
-from canbase_driver.cia301.sdo_client import Read, SdoAborted, SdoError, SdoTimeout, Write
+from canbase_driver.cia301.sdo_client import DEVICE_STATE, Read, SdoAborted, SdoError, SdoTimeout, Write
 from canbase_driver.cia402 import Command, DriveState, decode_statusword
 from canbase_driver.drive_units import AxisUnits
 from canbase_driver.motion.braking import Braking
@@ -74,6 +75,8 @@ class BootReport:
     """Every object that had another value than wanted: the old one and the new one."""
     scale: Mapping[str, tuple[Expected, ...]] = field(default_factory=dict)
     """By joint: what its numbers mean, as far as the drive reports it."""
+    unshown_mode: str = ""
+    """One of the notes: 6061h does not show the mode that was set."""
 
     @property
     def stops_by_itself(self) -> bool:
@@ -91,7 +94,33 @@ def boot(
     The last steps read the units: an answer to a write that was requested twice comes before theirs. The steps end with
     the report, or raise BootError when the node cannot be made ready.
     """
-    return _explained(_Boot(node_id, drives, robot, learned, identify).run())
+    return _explained(_twice(_Boot(node_id, drives, robot, learned, identify).run()))
+
+
+def _twice(steps: Steps[BootReport]) -> Steps[BootReport]:
+    """A write that the state of the drive forbids is tried once more: some drives are busy for a moment."""
+    answer: Any = None
+    refusal: SdoError | None = None
+    repeated: set[Write] = set()
+    while True:
+        try:
+            step = steps.send(answer) if refusal is None else steps.throw(refusal)
+        except StopIteration as end:
+            report: BootReport = end.value
+            return report
+        answer = refusal = None
+        try:
+            answer = yield step
+        except SdoError as error:
+            refusal = error
+        is_of_state = isinstance(refusal, SdoAborted) and refusal.code == DEVICE_STATE
+        if is_of_state and isinstance(step, Write) and step not in repeated:
+            repeated.add(step)
+            yield Pause(POLL_S, f"its state to allow {step}")
+            try:
+                answer, refusal = (yield step), None
+            except SdoError as error:
+                refusal = error
 
 
 def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:
@@ -129,7 +158,8 @@ class _Boot:
         for drive in self._drives:
             scale[drive.joint] = yield from check_scale(self._node, drive, identify=self._identify)
         notes = tuple(dict.fromkeys(self._node.notes))
-        return BootReport(self._node.node_id, identity, self_stop, notes, tuple(self._node.changes), scale)
+        changes, unshown_mode = tuple(self._node.changes), self._node.unshown_mode
+        return BootReport(self._node.node_id, identity, self_stop, notes, changes, scale, unshown_mode)
 
     # -- what is there
 

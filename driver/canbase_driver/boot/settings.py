@@ -16,7 +16,7 @@ from canbase_config.profile import Profile, SdoWrite
 from canbase_config.robot import CYCLIC, DRIVER_NODE_ID, WATCHDOG_NODE_ID, Robot
 from canbase_config.watchdog import LIFE_TIME_FACTOR, guard_time_ms
 from canbase_driver.boot.advice import GUARDING_ALONE
-from canbase_driver.boot.steps import BootError, NodeAccess, Steps
+from canbase_driver.boot.steps import MODE_POLLS, BootError, NodeAccess, Steps
 from canbase_driver.boot.vl_settings import KeptRamp, configure_vl, set_vl_ramp
 from canbase_driver.cia301.sdo_client import VALUE_INVALID, VALUE_TOO_HIGH, VALUE_TOO_LOW, Read, SdoAborted, Write
 from canbase_driver.drive_units import AxisUnits
@@ -75,6 +75,7 @@ def configure_motion(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
     kind, mode = drive.kind, drive.used_mode
     at = place(kind, MODE_DISPLAY, drive.axis)
     shown_at = Read(at.index, at.sub) if kind.options.mode_display in ("yes", "probe") else None
+    node.mode_polls = MODE_POLLS if kind.options.mode_display == "yes" else 1
     yield from node.set(write_at(drive, MODE, mode), shown_at=shown_at)
     if mode == CYCLIC:
         cycle_ms = round(1000.0 / robot.rates.control_hz)
@@ -120,8 +121,13 @@ def configure_sync(node: NodeAccess, kind: Profile, counter: int | None) -> Step
     """1019h as `bus.sync_counter` has it; a SYNC of another length than a drive expects is an error to it."""
     if counter is not None:
         yield from node.set(Write(SYNC_COUNTER, 0, counter, 1))
-    elif kind.options.sync_counter != "no" and (yield from node.read_if_present(SYNC_COUNTER)):
-        yield from node.set_if_present(Write(SYNC_COUNTER, 0, 0, 1))
+        return
+    kept = 0 if kind.options.sync_counter == "no" else (yield from node.read_if_present(SYNC_COUNTER))
+    if kept and not (yield from node.set_if_present(Write(SYNC_COUNTER, 0, 0, 1))):
+        node.notes.append(
+            f"1019h:0 stays at {kept}, and it may take no SYNC without a counter: set `bus.sync_counter: {kept}` in "
+            "robot.yaml, or 1019h:0 to 0 with the manufacturer's tool"
+        )
 
 
 def write_all(node: NodeAccess, writes: tuple[SdoWrite, ...]) -> Steps[None]:
@@ -172,6 +178,8 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
             continue
         problem = f"{kept.what}: {drive.joint} brakes with {has:.3g} m/s² by it"
         slower = f"set `limits.{key}: {math.floor(1000.0 * has) / 1000.0:g}` in robot.yaml, where it is {needed:g}"
+        if has < (ordinary := robot.limits.deceleration_mps2) < needed:
+            slower += f", and `limits.deceleration_mps2` to no more, where it is {ordinary:g}"
         hint = f"Set the object with the manufacturer's tool, or {slower}"
         raise BootError(node.node_id, problem, hint)
 

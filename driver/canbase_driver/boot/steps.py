@@ -74,6 +74,10 @@ Steps = Generator[Step, Any, T]
 """Yields steps; is sent the answer of each (bytes of a Read, b"" of a Write), or thrown SdoAborted or SdoTimeout."""
 
 
+MODE_POLL_S, MODE_POLLS = 0.1, 60
+"""A drive whose profile says that it shows its mode without power has 6 s for it."""
+
+
 class BootError(Exception):
     """A node cannot be made ready. The text names the object, the reason and what to try."""
 
@@ -105,6 +109,10 @@ class NodeAccess:
         self.node_id = node_id
         self.notes: list[str] = []
         self.changes: list[str] = []
+        self.unshown_mode = ""
+        """6061h showed another mode than was set; empty: it did not."""
+        self.mode_polls = 1
+        """How often 6061h is read until it shows the mode."""
         self.was_reset = False
         """Its objects 1000h to 1FFFh have the values of power-on (CiA 301): no earlier master's are left to look at."""
 
@@ -155,11 +163,18 @@ class NodeAccess:
         self.note_change(step, before)
 
     def _shows(self, shown_at: Read, step: Write) -> Steps[bool]:
-        """Whether another object shows the mode that was written."""
-        mode = yield from self.read_if_present(shown_at.index, shown_at.sub)
-        if mode is None or mode == unsigned(step.data):
-            return mode is not None
-        self.notes.append(f"{shown_at} shows mode {mode}, {step.value!r} was set; it may take power to change")
+        """Whether another object shows the mode that was written, at once or, where the profile says so, later."""
+        for polls_left in reversed(range(self.mode_polls)):
+            mode = yield from self.read_if_present(shown_at.index, shown_at.sub)
+            if mode is None or mode == unsigned(step.data):
+                return mode is not None
+            if polls_left:
+                yield Pause(MODE_POLL_S, f"mode {step.value!r} in {shown_at}, which shows {mode}")
+        self.unshown_mode = (
+            f"{shown_at} shows mode {mode}, {step.value!r} was set; it may take power to change, or time: with "
+            "`options.mode_display: yes` in its drive profile the boot waits for it"
+        )
+        self.notes.append(self.unshown_mode)
         return False
 
     def note_change(self, step: Write, before: str) -> None:

@@ -78,6 +78,11 @@ class Pdo:
         return self.kind == "TPDO"
 
     @property
+    def size(self) -> int:
+        """Bytes that are mapped."""
+        return sum(entry & 0xFF for entry in self.mapping) // 8
+
+    @property
     def communication(self) -> int:
         """Index of its communication parameters, 1400h… or 1800h…"""
         return (0x1400 if self.kind == "RPDO" else 0x1800) + self.number - 1
@@ -187,6 +192,11 @@ class NodeLayout:
             pdos.append(self._tpdo(2 * i + 1, self.status_cob_id(axis), status))
             pdos.append(self._tpdo(2 * i + 2, self.velocity_cob_id(axis), velocity, len(self.torque_objects)))
         return pdos
+
+    def feedback_pdo(self, axis: int, which: int) -> Pdo:
+        """0: the TPDO with the status of this axis, 1: with its velocity."""
+        cob_id = (self.status_cob_id(axis), self.velocity_cob_id(axis))[which and not self.joins_velocity]
+        return next(pdo for pdo in self._feedback() if pdo.cob_id == cob_id)
 
     def _tpdo(self, number: int, cob_id: int, mapping: tuple[int, ...], optional: int = 0) -> Pdo:
         pdo = Pdo("TPDO", number, cob_id, mapping=mapping, optional=optional)

@@ -17,6 +17,7 @@ from canbase_driver.cia301.pdo import (
 )
 from canbase_driver.cia402 import VL_RAMP, Command, DriveState, PowerGoal, decode_statusword
 from canbase_driver.drive_units import AxisUnits
+from canbase_driver.drives.feedback_factor import FeedbackFactor
 from canbase_driver.drives.release_test import TorqueEvidence
 from canbase_driver.drives.stall import Stall, StallLimits
 from canbase_driver.drives.standstill import Stillness, StillnessLimits
@@ -55,6 +56,10 @@ class Axis:
         self.stillness = Stillness(StillnessLimits.of(robot, drive), metres_per_count)
         self.torque_evidence = TorqueEvidence(LETS_GO_SHARE * robot.watchdog.stand_impulse_s, metres_per_count)
         self.stall = Stall(StallLimits.of(robot))
+        self.factor = FeedbackFactor(drive, metres_per_count)
+        self.misfit_bytes: tuple[int, int] | None = None
+        """Length of the last TPDO that was not understood, 0 for the status and 1 for the velocity before it."""
+        self._raw_position = 0
         self._feedback_s = robot.timeouts.feedback_s
         self._layout = layout.profile.layout
         self._with_enable = VL_RAMP if layout.profile.is_vl else 0
@@ -99,6 +104,7 @@ class Axis:
         self.status_at = self.velocity_at = -math.inf
         self.state, self.has_torque = None, True
         self.velocity_mps = 0.0
+        self.misfit_bytes = None
         self.stillness.forget()
         self.travel.reset_reference()
         self._status_is_new = self.has_new_sample = False
@@ -107,8 +113,10 @@ class Axis:
         """Take 6041h and 6064h, and 606Ch where it is behind them. False: wrong length, to be dropped and counted."""
         status = unpack_status(data, self._layout, self.drive.axis)
         if status is None:
+            self.misfit_bytes = 0, len(data)
             return False
         self.statusword, counts = status
+        self._raw_position = counts
         self.state = decode_statusword(self.statusword)
         gap_s = min(now_s - self.status_at, GAP_MAX_S)
         self.travel.update(counts, max(1, round(gap_s * self._control_hz)))
@@ -123,11 +131,13 @@ class Axis:
         """Take 606Ch, which follows the status of the same SYNC. False: wrong length, to be dropped and counted."""
         raw = unpack_velocity(data, self._layout)
         if raw is None:
+            self.misfit_bytes = 1, len(data)
             return False
         self.velocity_mps = self.units.velocity_mps(raw)
         if now_s - self.velocity_at > self._feedback_s:
             self.stillness.pause()
         self.velocity_at = now_s
+        self.factor.on_sample(self._raw_position, self.velocity_mps, now_s)
         ordered_mps = self.target_mps if self.state is DriveState.OPERATION_ENABLED else 0.0
         travel_m = self.travel.travel_m
         self.stillness.on_sample(travel_m, self.velocity_mps, ordered_mps, now_s)

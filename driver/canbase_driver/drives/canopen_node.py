@@ -18,7 +18,7 @@ from enum import Enum
 
 from canbase_config.profile import Profile
 from canbase_config.robot import Robot
-from canbase_driver.boot.advice import GUARDING_ALONE
+from canbase_driver.boot.advice import ELSE_UNUSABLE, GUARDING_ALONE
 from canbase_driver.boot.node_boot import NodeBoot
 from canbase_driver.boot.sequence import BootReport
 from canbase_driver.boot.steps import BootTimes
@@ -37,6 +37,8 @@ from canbase_driver.drives.telemetry import Measures, Values
 
 START_TIMEOUT_S = 1.0
 """From NMT start to a heartbeat "operational" and a status of every axis."""
+HEARTBEAT_S = 5.0
+"""From NMT start to its first heartbeat, where nothing else is missing: another boot would reset it again [s]."""
 HOLD_S = 0.2
 """After the last NMT "enter pre-operational" it is left alone this long [s]; the watchdog repeats it every 0.05 s."""
 HELD = (
@@ -95,7 +97,8 @@ class CanopenNode:
         self.emcy: Emcy | None = None
         self.report: BootReport | None = None
         """Of the last boot, while the node is there."""
-        self.boot_error = ""
+        self.boot_error = self.unshown_mode = ""
+        """What its last boot that ended well noted about a mode that 6061h did not show; empty: nothing."""
         self.others_are_configured: Callable[[], bool] = lambda: True
         """Whether no other node is in the middle of its boot; set by the drive group."""
         self._measures = Measures(node_id, self._drives, robot.timeouts.sdo_s)
@@ -179,7 +182,7 @@ class CanopenNode:
         if self.presence is Presence.BOOTING and self._boot is not None:
             cure = f"; {self._signs.what_to_check(now_s)}" if self._is_absent(now_s) else ""
             return self._boot.waiting_for + cure + (f" (last try: {self.boot_error})" if self.boot_error else "")
-        if self.presence is Presence.STARTING and self.boot_error and self._awaits_guard:
+        if self.presence is Presence.STARTING and self.boot_error:
             return f"{self.name}: {self.boot_error}"
         if self.presence is Presence.STARTING:
             return f"{self.name}: waiting for its first feedback since {now_s - self._since_s:.1f} s"
@@ -458,7 +461,7 @@ class CanopenNode:
 
     def _start(self, report: BootReport, now_s: float) -> Frame:
         self._boot_up_at = self._boot.boot_up_at if self._boot is not None else -math.inf
-        self.report = report
+        self.report, self.unshown_mode = report, report.unshown_mode
         self._lost_heartbeat = False
         if self._boot is not None:
             self._written = self._in_boot.left_by(self._boot)
@@ -466,6 +469,7 @@ class CanopenNode:
         self.nmt_state = None
         self._guarded = None if self._guarded is None else GuardAnswers()
         for axis in self.axes:
+            axis.factor.forget()
             axis.travel.reset_reference()  # to what came since it was lost: another drive of this id may have sent it
         self._go(Presence.STARTING, now_s)
         return nmt(NmtCommand.START, self.node_id)
@@ -478,7 +482,7 @@ class CanopenNode:
             self._go(Presence.READY, now_s)
         elif now_s - self._since_s > START_TIMEOUT_S:
             self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now_s)}"
-            if fed and self._awaits_guard:
+            if fed and (self._awaits_guard or (self.nmt_state is None and now_s - self._since_s <= HEARTBEAT_S)):
                 return  # it sends feedback: another boot would bring no watchdog that sends requests
             self.lose(f"could not be started: {self.boot_error}", now_s)
 
@@ -492,7 +496,8 @@ class CanopenNode:
     def _not_started(self, now_s: float) -> str:
         """What a node that was started has not sent, and what that may come from. It has answered SDOs until then."""
         lacking = [
-            f"no status of {axis.drive.joint} (its TPDOs: see pdo.synchronous of its drive profile)"
+            self._misfit(axis)
+            or f"no status of {axis.drive.joint} (its TPDOs: see pdo.synchronous of its drive profile)"
             for axis in self.axes
             if axis.age_s(now_s) > self._robot.timeouts.feedback_s
         ]
@@ -505,6 +510,20 @@ class CanopenNode:
             lacking.append(NO_TOGGLE)
         notes = self.report.notes if self.report else ()
         return " and ".join(lacking) + (f"; its boot noted: {'; '.join(notes)}" if notes else "")
+
+    def _misfit(self, axis: Axis) -> str:
+        """A TPDO that came in another length than its mapping has; empty: none did."""
+        if axis.misfit_bytes is None:
+            return ""
+        which, size = axis.misfit_bytes
+        pdo = self.layout.feedback_pdo(axis.drive.axis, which)
+        objects = ", ".join(f"{entry >> 16:04X}h:{entry >> 8 & 0xFF}" for entry in pdo.mapping)
+        cob_id = f"{pdo.cob_id:03X}h"
+        return (
+            f"{pdo.name} ({cob_id}) of {axis.drive.joint} with {size} bytes, its mapping has {pdo.size}: let "
+            f"{pdo.mapping_object:04X}h map {objects} alone, with the manufacturer's tool, or find the other device "
+            f"that sends {cob_id}; {ELSE_UNUSABLE}"
+        )
 
     def _go(self, presence: Presence, now_s: float) -> None:
         self.presence, self._since_s = presence, now_s

@@ -166,6 +166,18 @@ class Drives:
             if axis.drive.node_id == node_id and axis.stall.time_s > 0.0
         )
 
+    def contradiction(self, node_id: int) -> str:
+        """Which wheel's position and velocity contradict each other by a factor or in their sign, and what to do; of
+        this node first."""
+        for axis in sorted(self.axes, key=lambda axis: axis.drive.node_id != node_id):
+            if sentence := axis.factor.sentence:
+                return f"{axis.drive.joint} (node {axis.drive.node_id}): {sentence}"
+        return ""
+
+    def unshown_mode(self, node_id: int) -> str:
+        """What the boot of this node noted about a mode that 6061h did not show; empty: nothing."""
+        return _first(node.unshown_mode for node in self.nodes if node.node_id == node_id)
+
     def doubt(self, node_id: int, why: str) -> None:
         """What this node measures is no evidence: the watchdog has found it implausible."""
         for axis in self.axes:

@@ -60,3 +60,17 @@ class Manner:
     """An emergency message of the manufacturer's, followed by "no error", so often [s]; 0: none."""
     start_count: int | None = None
     """6064h after power on."""
+    tpdo_padding: int = 0
+    """Its first TPDO has so many bytes behind those that are mapped."""
+    refuses_first: bool = False
+    """The first write to each entry after power on is refused with 0800 0022h."""
+    heartbeat_late_s: float = 0.0
+    """From a boot-up message to the first heartbeat [s]."""
+    mode_late_s: float = 0.0
+    """6061h follows 6060h so late, and the motor with it [s]."""
+    counts_per_m: float = 0.0
+    """Increments of 6064h for one metre of the rim, whatever robot.yaml has; 0: as robot.yaml has it."""
+    position_range: int = 0
+    """6064h wraps within 0 to this (607Bh)."""
+    velocity_sign: int = 1
+    """Of 606Ch, against 60FFh and 6064h."""

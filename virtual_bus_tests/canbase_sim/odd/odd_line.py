@@ -9,7 +9,7 @@ from canbase_sim.frame import Frame
 from canbase_sim.line import Line
 from canbase_sim.odd.manner import Manner
 
-TPDOS = range(0x180, 0x580)
+TPDO1, HEARTBEAT, BOOT_UP = 0x180, 0x700, b"\0"
 
 
 class OddLine(Line):
@@ -19,21 +19,27 @@ class OddLine(Line):
         super().__init__(answer_delay_s)
         self._manner, self._random = manner, random
         self._late_pdos: deque[tuple[float, Frame]] = deque()
-        self.now_s = 0.0
+        self.now_s = self._boot_up_at = 0.0
 
     def say(self, frame: Frame) -> None:
         """Send it, twice now and then: a CAN controller repeats a frame whose last bit was disturbed (ISO 11898-1)."""
+        is_heartbeat = frame.cob_id >= HEARTBEAT and frame.data != BOOT_UP
+        if is_heartbeat and self.now_s < self._boot_up_at + self._manner.heartbeat_late_s:
+            return
         super().say(frame)
         if self._manner.frames_twice and self._random.random() < self._manner.frames_twice:
             super().say(frame)
 
     def say_boot_up(self, frame: Frame) -> None:
         """A boot-up message, where it has one."""
+        self._boot_up_at = self.now_s
         if self._manner.boot_ups:
             super().say_boot_up(frame)
 
     def say_pdo(self, frame: Frame) -> None:
         """A TPDO, after its time."""
+        if self._manner.tpdo_padding and frame.cob_id & ~0x7F == TPDO1:
+            frame = Frame(frame.cob_id, frame.data + bytes(self._manner.tpdo_padding))
         late_s = self._manner.pdo_late_s * self._random.random()
         if not late_s:
             self.say(frame)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from random import Random
@@ -45,6 +46,7 @@ class OddNode(SimulatedNode):
         self.manner, self._random = manner, Random(f"odd {seed} {node_id}")
         self._emcy_at, self._is_error = now_s, False
         self._is_up = False
+        self._modes: dict[int, tuple[int, float]] = {}
         super().__init__(node_id, axes, now_s, boot_delay_s, fixed, manner.personality, sdo_delay_s, supply_v)
         self._is_up = True
         for tpdo in self._tpdos:
@@ -60,7 +62,22 @@ class OddNode(SimulatedNode):
             self._emcy_at = now_s + (EMCY_S if self._is_error else self.manner.emcy_every_s)
             code = MAKERS_CODE if self._is_error else NO_ERROR
             self._send_emcy(Frame(0x080 + self.node_id, struct.pack("<HB5x", code, 0x80 * self._is_error)))
+        self._follow_modes(now_s)
         return super().tick(now_s)
+
+    def _follow_modes(self, now_s: float) -> None:
+        """6061h and the motor, some time after 6060h."""
+        if not self.manner.mode_late_s:
+            return
+        for number, axis in enumerate(self.axes):
+            mode = self.dictionary.values[key(0x6060 + AXIS_STRIDE * number)]
+            if mode != self._modes.get(number, (0, 0.0))[0]:
+                self._modes[number] = mode, now_s
+            waits = now_s < self._modes.get(number, (0, -math.inf))[1] + self.manner.mode_late_s
+            if waits or axis.faults.ignores_setpoints:
+                self.dictionary.values[key(0x6061 + AXIS_STRIDE * number)] = 0 if waits else mode
+                axis.faults.ignores_setpoints = waits
+                axis._steer()
 
     def _make_line(self, answer_delay_s: float) -> Line:
         self._odd_line = OddLine(answer_delay_s, self.manner, self._random)
@@ -82,5 +99,12 @@ class OddNode(SimulatedNode):
                 noise = self._random.randint(-manner.velocity_noise, manner.velocity_noise)
                 velocity = key(0x606C + base)
                 values[velocity] = axis.scale.limited(values[velocity] + noise)
+            counts = key(0x6064 + base)
+            if manner.position_range:
+                values[counts] %= manner.position_range + 1
+            elif manner.counts_per_m:
+                scaled = values[counts] * manner.counts_per_m / axis.scale.counts_per_m
+                values[counts] = (round(scaled) + 2**31) % 2**32 - 2**31
+            values[key(0x606C + base)] *= manner.velocity_sign
             if manner.status_bits:
                 values[key(0x6041 + base)] |= self._random.getrandbits(16) & manner.status_bits

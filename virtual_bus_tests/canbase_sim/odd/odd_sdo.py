@@ -13,6 +13,7 @@ from canbase_sim.odd.manner import Manner
 DOWNLOAD, UPLOAD, SEGMENT = 1, 2, 3
 """Client command specifiers: initiate download, initiate upload, upload segment."""
 EXPEDITED = 0x02
+DEVICE_STATE = 0x0800_0022
 
 
 class OddSdoService(SdoService):
@@ -22,6 +23,7 @@ class OddSdoService(SdoService):
         super().__init__(node_id, dictionary, lambda frame: self._answer(frame))
         self._manner, self._really_send = manner, send
         self._segment = b""
+        self._refused: set[int] = set()
 
     def receive(self, data: bytes) -> None:
         """One request."""
@@ -39,6 +41,9 @@ class OddSdoService(SdoService):
             return manner.refused_reads.get(entry, 0)
         if data[0] >> 5 != DOWNLOAD:
             return 0
+        if manner.refuses_first and entry not in self._refused:
+            self._refused.add(entry)
+            return DEVICE_STATE
         bounds = manner.bounds.get(entry)
         if bounds is not None and bounds.code and bounds.nearest(_value(data)) != _value(data):
             return bounds.code

@@ -38,6 +38,8 @@ VELOCITY_UNITS = {
     "counts/s": {key(0x60A9): Extra("I", 0x00B5_0300)},
 }
 """Units of 60FFh that are not those of the sample robot's file, and the objects by which a drive reports them."""
+COUNTS_PER_MOTOR_REV, COUNTS_PER_M = 4096, 130_379.7
+"""6064h of the sample robot."""
 RAMP_BITS_PER_MPS2 = 19098.6
 """6085h of the sample robot, whose velocity unit is 0.1 rpm: gear 20, wheel radius 0.1 m."""
 
@@ -268,13 +270,13 @@ def _coasts(random: Random) -> Drawn:
 
 
 def _soft_stop(random: Random) -> Drawn:
-    """Between the ordinary deceleration of the sample robot (1 m/s²) and its quick stop (2 m/s²)."""
-    mps2 = round(random.uniform(1.1, 1.8), 2)
+    """Below the quick stop of the sample robot (2 m/s²), or its ordinary deceleration too (1 m/s²)."""
+    mps2 = round(random.uniform(0.5, 1.8), 2)
     raw, code = round(mps2 * RAMP_BITS_PER_MPS2), random.choice((0, 0x0609_0031))
     change = both(
         with_personality(defaults={key(0x6085): raw}), with_manner(bounds={key(0x6085): Bounds(1, raw, 1, code)})
     )
-    keys = {"limits.emergency_deceleration_mps2": round(mps2 - 0.01, 2)}
+    keys = dict.fromkeys(("limits.emergency_deceleration_mps2", "limits.deceleration_mps2"), round(mps2 - 0.01, 2))
     return Drawn(f"6085h is at most {raw} ({mps2} m/s²), with {code:08X}h", change, keys, frozenset((0x6085,)))
 
 
@@ -323,6 +325,54 @@ def _sdo_channels(random: Random) -> Drawn:
     return Drawn(text, change, tool=frozenset((0x1201,)) if is_open and is_fixed else frozenset())
 
 
+def _busy(_random: Random) -> Drawn:
+    return Drawn("refuses the first write to each object with 08000022h", with_manner(refuses_first=True))
+
+
+def _late_heartbeat(random: Random) -> Drawn:
+    late_s = round(random.uniform(0.5, 4.0), 2)
+    return Drawn(f"its first heartbeat comes {late_s} s after its boot-up", with_manner(heartbeat_late_s=late_s))
+
+
+def _long_tpdo(_random: Random) -> Drawn:
+    return Drawn("two bytes more than mapped in TPDO1", with_manner(tpdo_padding=2), tool=frozenset((0x1A00,)))
+
+
+def _fixed_mapping(random: Random) -> Drawn:
+    entry, code = key(0x1A00, random.choice((0, 1, 2))), random.choice((0x0601_0002, GENERAL_ERROR))
+    change = with_manner(refused_writes={entry: code})
+    return Drawn(f"writing {_hex(entry)} is refused with {code:08X}h", change, tool=frozenset((0x1A00,)))
+
+
+def _counted_syncs(_random: Random) -> Drawn:
+    change = both(with_personality(defaults={key(0x1019): 10}), with_manner(refused_writes={key(0x1019): 0x0601_0002}))
+    return Drawn("1019h is read-only, and 10", change, tool=frozenset((0x1019,)))
+
+
+def _late_mode(random: Random) -> Drawn:
+    late_s = round(random.uniform(2.5, 4.0), 2)
+    change = with_manner(mode_late_s=late_s)
+    return Drawn(f"6061h follows 6060h after {late_s} s", change, {"options.mode_display": "yes"})
+
+
+def _other_counts(random: Random) -> Drawn:
+    factor = random.choice((0.05, 0.25, 0.5, 2.0))
+    keys = {"counts_per_motor_rev": round(factor * COUNTS_PER_MOTOR_REV)}
+    change = with_manner(counts_per_m=keys["counts_per_motor_rev"] / COUNTS_PER_MOTOR_REV * COUNTS_PER_M)
+    return Drawn(f"6064h counts {factor} times as far as robot.yaml says", change, keys)
+
+
+def _short_range(random: Random) -> Drawn:
+    most = random.choice((4095, 65_535, 999_999))
+    extras = {key(0x607B): Extra("B", 2), key(0x607B, 1): Extra("i", 0), key(0x607B, 2): Extra("i", most)}
+    change = both(with_personality(extras=extras), with_manner(position_range=most))
+    return Drawn(f"6064h wraps from {most} to 0, by 607Bh", change, tool=frozenset((0x607B,)))
+
+
+def _reversed_velocity(_random: Random) -> Drawn:
+    return Drawn("606Ch has the other sign", with_manner(velocity_sign=-1), tool=frozenset((0x607E,)))
+
+
 ALIKE = (
     frozenset(("few_pdos", "fixed_cob_ids", "one_tpdo")),
     frozenset(("narrow_velocity", "one_tpdo")),
@@ -333,6 +383,11 @@ ALIKE = (
     frozenset(("coasts", "stays_in_quick_stop")),
     frozenset(("soft_stop", "rounded_ramps")),
     frozenset(("other_unit", "soft_stop", "rounded_ramps", "refused", "missing")),  # ramps in the unit of 60FFh
+    frozenset(("counted_syncs", "refused", "missing", "no_synchronous_pdos")),
+    frozenset(("late_mode", "mode_without_power", "cyclic_alone", "refused", "missing")),
+    frozenset(("other_counts", "short_range", "reversed_velocity", "noisy_velocity", "count_wraps", "other_unit")),
+    frozenset(("late_heartbeat", "guarding_alone")),
+    frozenset(("long_tpdo", "fixed_mapping", "one_tpdo", "narrow_velocity", "wide_status")),
     frozenset(("other_unit", "noisy_velocity", "narrow_target", "narrow_velocity", "one_tpdo", "stored_values")),
 )
 """A drive has one of each of these sets at most."""
@@ -381,6 +436,15 @@ ODDITIES: Mapping[str, Oddity] = {
     "noisy_velocity": Oddity("CiA 402-2, 606Ch: no accuracy", "the measured speed has noise", _noisy_velocity),
     "emergencies": Oddity("CiA 301, EMCY: FFxxh", "the manufacturer's emergency messages", _emergencies),
     "other_unit": Oddity("CiA 402-2, 60A9h; 608Bh, 608Ch of 2.0", "its velocities have another unit", _other_unit),
+    "busy": Oddity("CiA 301, 0800 0022h", "its state forbids each write once", _busy),
+    "late_heartbeat": Oddity("CiA 301, 1017h: no time limit", "heartbeats begin late", _late_heartbeat),
+    "long_tpdo": Oddity("seen: a fixed length of 8 bytes", "a TPDO longer than its mapping", _long_tpdo),
+    "fixed_mapping": Oddity("CiA 301, 1A00h: rw or const", "a mapping that cannot be written", _fixed_mapping),
+    "counted_syncs": Oddity("CiA 301, 1019h", "it takes SYNCs with a counter alone", _counted_syncs),
+    "late_mode": Oddity("CiA 402-2, 6061h: no time limit", "its mode changes late", _late_mode),
+    "other_counts": Oddity("CiA 402-2, 608Fh to 6093h", "its position has another unit", _other_counts),
+    "short_range": Oddity("CiA 402-2, 607Bh", "the position has a short range", _short_range),
+    "reversed_velocity": Oddity("seen: swapped tracks", "606Ch has the other sign", _reversed_velocity),
     "count_wraps": Oddity("CiA 402-2, 6064h: INTEGER32", "the counter of the encoder wraps", _count_wraps),
 }
 """By name."""

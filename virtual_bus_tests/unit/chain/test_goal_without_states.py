@@ -113,6 +113,6 @@ def test_one_lost_message_ends_no_goal(topic: str) -> None:
     story = Goal()
     for second in range(4):
         story.world.clock.after(second + 0.01, story.lose, topic)
-        story.world.clock.after(second + 0.115, story.world.topics.loss.pop, topic)
+        story.world.clock.after(second + 0.11, story.world.topics.loss.pop, topic)
     story.run(4.0)
     assert story.goal.ends == []

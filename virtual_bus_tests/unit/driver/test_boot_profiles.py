@@ -221,7 +221,24 @@ def test_a_drive_of_mode_2_that_would_turn_or_brake_otherwise_than_ordered_is_re
 def test_a_mode_that_is_not_taken_is_told() -> None:
     drive = FakeDrive(objects=factory_objects() | {(0x6061, 0): u8(0)})
     boot, _ = booted(drive, of_kind("epos4"))
-    assert "6061h:0 shows mode 0, 3 was set; it may take power to change" in notes_of(boot)
+    assert boot.report is not None
+    assert boot.report.unshown_mode in notes_of(boot)
+    assert boot.report.unshown_mode.startswith("6061h:0 shows mode 0, 3 was set; it may take power to change, or time")
+
+
+@pytest.mark.parametrize(("shows", "waits"), [("yes", True), ("probe", False)])
+def test_a_mode_that_is_shown_late_is_waited_for_where_the_profile_says_that_it_is_shown(
+    shows: str, waits: bool, tmp_path: Path
+) -> None:
+    profile = tmp_path / "late.yaml"
+    profile.write_text(f"title: late\noptions: {{mode_display: {shows}}}\n")
+    drive = FakeDrive(objects=factory_objects() | {(0x6061, 0): u8(0)})
+    base = of_kind(str(profile))
+    bench = Bench(drive, base, base.drives[:1])
+    bench.run(3.0)
+    assert bench.boot.done is not waits
+    drive.objects[0x6061, 0] = u8(3)
+    assert ("6061h" in str(notes_of(bench.run(1.0)))) is not waits
 
 
 def test_a_drive_that_shows_its_mode_with_power_alone_is_not_asked() -> None:

@@ -463,7 +463,7 @@ def test_an_answer_that_comes_late_and_then_again_names_no_second_drive() -> Non
             (0x1A00, 0),
             READ_ONLY,
             "TPDO1 does not take another mapping (1A00h:0: 0601 0002h",
-            "carry 6041h:0, 6064h:0 wi",
+            "it carries 2000h:0",
         ),
         ((0x1600, 1), DEVICE_STATE, "RPDO1 does not take 6040h:0 (1600h:1: 0800 0022h", "switch the drive off and on"),
         ((0x1400, 2), DEVICE_STATE, "1400h:2: 0800 0022h", "switch the drive off and on again"),
@@ -748,3 +748,48 @@ def test_a_drive_that_reads_back_another_mapping_is_told_what_its_pdo_needs() ->
     text = error_of(boot_one_axis(FakeDrive(on_write={(0x1600, 0): swaps})))
     assert "RPDO1 reads back another mapping than was written to 1600h" in text
     assert "Let RPDO1 carry 6040h:0, 60FFh:0 with the manufacturer's tool" in text
+
+
+def test_a_sync_counter_that_stays_is_noted_with_the_key_and_the_tool() -> None:
+    drive = FakeDrive(objects=factory_objects() | {(0x1019, 0): u8(10)}, refuse={(0x1019, 0): READ_ONLY})
+    assert "set `bus.sync_counter: 10` in robot.yaml, or 1019h:0 to 0 with the manuf" in str(
+        notes_of(boot_one_axis(drive))
+    )
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "is_refused", "is_noted"),
+    [
+        (0, 99_999, True, False),
+        (-1_000_000_000, 1_000_000_000, False, True),
+        (-(2**31), 2**31 - 1, False, False),
+        (0, 0, False, False),
+    ],
+)
+def test_a_range_in_which_the_position_wraps_is_refused_where_it_is_short(
+    lowest: int, highest: int, is_refused: bool, is_noted: bool
+) -> None:
+    ends = {(0x607B, 1): u32(lowest % 2**32), (0x607B, 2): u32(highest % 2**32)}
+    boot = boot_one_axis(FakeDrive(objects=factory_objects() | ends))
+    said = f"607Bh lets 6064h of left wrap between {lowest} and {highest}"
+    assert (said in str(boot.error)) is is_refused
+    assert (boot.report is not None and said in str(boot.report.notes)) is is_noted
+
+
+def test_a_write_that_the_state_of_the_drive_forbids_once_is_tried_again_and_no_third_time() -> None:
+    refused: list[Key] = []
+
+    class Busy(FakeDrive):
+        def _write(self, key: Key, data: bytes) -> int:
+            if refused.count(key) < patience:
+                refused.append(key)
+                return DEVICE_STATE
+            return super()._write(key, data)
+
+    patience = 1
+    assert notes_of(boot_one_axis(Busy())) == ()
+    assert len(refused) == len(set(refused)) > 10
+    patience = 3
+    refused.clear()
+    assert "0800 0022h" in str(error_of(boot_one_axis(Busy())))
+    assert max(refused.count(key) for key in refused) >= 2

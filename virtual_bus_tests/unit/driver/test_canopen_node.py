@@ -51,9 +51,10 @@ class Story:
     def heartbeat(self, state: int) -> bool:
         return self.node.on_heartbeat(Frame(0x701, bytes([state])), self.now_s)
 
-    def status(self) -> bool:
+    def status(self, beyond: bytes = b"") -> bool:
         """Status and velocity, as they answer one SYNC."""
-        status = self.node.on_status(self.axis, Frame(0x181, bytes.fromhex("37 06 10 00 00 00")), self.now_s)
+        data = bytes.fromhex("37 06 10 00 00 00") + beyond
+        status = self.node.on_status(self.axis, Frame(0x181, data), self.now_s)
         return self.node.on_velocity(self.axis, Frame(0x281, bytes(4)), self.now_s) and status
 
     def booted(self) -> Story:
@@ -168,12 +169,38 @@ def test_without_heartbeat_or_status_it_is_lost_after_a_second(beats: bool, spea
 
 def test_a_drive_without_a_heartbeat_is_said_to_have_none() -> None:
     story = Story().started()
-    for _ in range(103):
+    said = "sent no heartbeat (1017h; where it has node guarding alone, set `self_stop.node_guarding: true` and `self"
+    for _ in range(499):
         story.wait(0.01)
         story.status()
-    said = "sent no heartbeat (1017h; where it has node guarding alone, set `self_stop.node_guarding: true` and `self"
+    assert said in story.node.waiting_for(story.now_s)
+    story.wait(0.02)
+    story.status()
     assert said in story.node.absent()
     assert said in story.node.boot_error
+
+
+def test_a_first_heartbeat_some_seconds_after_the_start_is_waited_for() -> None:
+    story = Story().started()
+    for _ in range(300):
+        story.wait(0.01)
+        story.status()
+    assert story.node.presence is STARTING
+    story.heartbeat(OPERATIONAL)
+    story.wait(0.01)
+    story.status()
+    assert (story.node.presence, story.node.boot_error) == (READY, "")
+
+
+def test_a_status_of_another_length_is_named_with_its_object() -> None:
+    story = Story().started()
+    for _ in range(103):
+        story.wait(0.01)
+        story.heartbeat(OPERATIONAL)
+        story.status(beyond=b"\0\0")
+    assert "it sent TPDO1 (181h) of left_wheel with 8 bytes, its mapping has 6: let 1A00h map 6041h:0" in (
+        story.node.boot_error
+    )
 
 
 def test_a_node_that_is_silent_without_power_is_asked_again_after_a_second() -> None:
