@@ -54,6 +54,13 @@ class EdsObject:
     is_set: bool = False
     has_node_id: bool = False
     """Whether the node id is added to its value, or to its default."""
+    is_mappable: bool | None = None
+    """PDOMapping; None: the file does not say."""
+
+    @property
+    def is_writable(self) -> bool:
+        """By its AccessType."""
+        return self.access not in ("ro", "const")
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +108,8 @@ def read_eds(path: str | Path) -> Eds:
     objects = {(found.index, found.sub): found for found in _objects(sections, compact, notes)}
     if not objects:
         first = next((line for line in text.splitlines() if line.strip()), "")
+        if first.lstrip().startswith("<"):
+            raise EdsError(f"{path}:1: this is XML (XDD or XDC, CiA 311), which is not read: take the drive's EDS file")
         raise EdsError(f"{path}:1: no section describes an object ([1000], [6040], …); it begins with {first[:40]!r}")
     info = sections.get("deviceinfo")
     if info is None:
@@ -245,6 +254,7 @@ def _object(section: _Section, index: int, sub: int, notes: list[str]) -> EdsObj
         low=_limit(value("lowlimit"), kind), high=_limit(value("highlimit"), kind),
         text=value("parametervalue") if is_set else value("defaultvalue"), is_set=is_set,
         has_node_id=adds_node_id(value("parametervalue")) or adds_node_id(value("defaultvalue")),
+        is_mappable=None if (mapping := number(value("pdomapping"))) is None else bool(mapping),
     )  # fmt: skip
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 from canbase_config.eds_file import Eds, number
 from canbase_config.errors import printable
-from canbase_config.object_map import PROFILE_402
+from canbase_config.object_map import AXIS_OFFSET, PROFILE_402
 
 NEEDED: Final = (0x6040, 0x6041, 0x6060, 0x6064, 0x606C, 0x60FF, 0x1400, 0x1600, 0x1800, 0x1A00)
 """What canbase cannot do without."""
 NEEDED_OF_VL: Final = (*(index for index in NEEDED if index not in (0x606C, 0x60FF)), 0x6042, 0x6044)
 """The same of an inverter, in mode 2."""
+NOT_IN_A_PDO: Final = (0x6060, 0x1400, 0x1600, 0x1800, 0x1A00)
+"""Of these, what no PDO carries."""
+MAPPINGS: Final = (0x1600, 0x1601, 0x1602, 0x1603, 0x1A00, 0x1A01, 0x1A02, 0x1A03)
+MOST_AXES: Final = 2
 SI_RPM: Final = 0x00B4_4700
 """60A9h: revolutions per minute."""
 INTEGER16, UNSIGNED32 = 0x03, 0x07
@@ -36,6 +41,8 @@ class Draft:
     self_stop: str
     """Whether the drive stops by itself when the computer dies, in a sentence."""
     unknown: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+    """What the EDS has otherwise than canbase needs it, a sentence each: an EDS may be wrong, so it is drafted."""
 
 
 class _Lines:
@@ -85,9 +92,46 @@ def draft(eds: Eds) -> Draft:
     if eds.has(0x6079):
         out.section("measures")
         out.lines.append("  voltage: {index: 0x6079, bits: 32, scale: 0.001}   # has 6079h; CiA 402-2: mV")
-    head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: not proven. See docs/drive_types.md.\n\n"
+    doubts = tuple(_doubts(eds))
+    head = f"# Drafted from {eds.path.name} by `canbase config from-eds`: not proven. See docs/drive_types.md.\n"
+    head += "".join(f"# {doubt}.\n" for doubt in doubts) + "\n"
     tail = ["unproven:", *(f"  - {path}" for path in out.unproven)]
-    return Draft(head + "\n".join(out.lines + tail) + "\n", missing, self_stop_sentence(eds), UNKNOWN_TO_ANY_EDS)
+    return Draft(
+        head + "\n".join(out.lines + tail) + "\n", missing, self_stop_sentence(eds), UNKNOWN_TO_ANY_EDS, doubts
+    )
+
+
+def _doubts(eds: Eds) -> Iterator[str]:
+    targets = [index for index in range(0x60FF, 0xA000, AXIS_OFFSET) if eds.has(index)]
+    motors = max(len(targets), sum(index == 0x60FF and sub > 0 for index, sub in eds.objects))
+    if motors > MOST_AXES:
+        yield f"it has {motors} axes, and the first {MOST_AXES} of a node can be used: the draft has these"
+    fixed = [f"{index:04X}h" for index in MAPPINGS if _is_fixed(eds, index)]
+    if fixed:
+        yield (
+            f"{', '.join(fixed)} cannot be written (AccessType): a drive whose PDOs do not carry what docs/bus.md has, "
+            "as delivered or by the manufacturer's tool, cannot be used"
+        )
+    needed = NEEDED_OF_VL if _is_vl(eds) else NEEDED
+    unmapped = [f"{index:04X}h" for index in needed if index not in NOT_IN_A_PDO and _is_unmappable(eds, index)]
+    if unmapped:
+        yield f"{', '.join(unmapped)} cannot be in a PDO (PDOMapping=0): if that is right, the drive cannot be used"
+    if not eds.has(0x1017):
+        guarding = "it has" if _can_be_guarded(eds) else "by this file it does not have"
+        yield (
+            "it has no 1017h and sends no heartbeat: canbase needs one, or node guarding with 6007h, which "
+            f"{guarding} (self_stop.node_guarding)"
+        )
+
+
+def _is_fixed(eds: Eds, index: int) -> bool:
+    described = [found for (at, _), found in eds.objects.items() if at == index]
+    return bool(described) and not any(found.is_writable for found in described)
+
+
+def _is_unmappable(eds: Eds, index: int) -> bool:
+    described = [found for (at, sub), found in eds.objects.items() if at == index and (sub or not eds.has(index, 1))]
+    return bool(described) and all(found.is_mappable is False for found in described)
 
 
 def _is_vl(eds: Eds) -> bool:

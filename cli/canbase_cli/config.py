@@ -102,6 +102,7 @@ def from_eds(file: Annotated[Path, typer.Argument(metavar="FILE", help="The EDS 
     lines = [f"{file}: {len(eds.objects)} objects, read as {eds.encoding}"]
     lines += [f"  odd: {printable(note)}" for note in eds.notes[:MOST_TOLD]]
     lines += [f"  and {len(eds.notes) - MOST_TOLD} more"] if len(eds.notes) > MOST_TOLD else []
+    lines += [f"  doubt: {doubt}" for doubt in found.doubts]
     lines += [f"  not in an EDS: {unknown}" for unknown in found.unknown]
     typer.secho("\n".join(lines), err=True, color=colour())
     typer.secho(found.self_stop, err=True, bold=True, color=colour())

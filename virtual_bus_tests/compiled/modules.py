@@ -29,7 +29,8 @@ HOT = {
     "canbase_driver": (
         "causes cia402 core drive_units snapshot boot.node_boot boot.sdo_budget cia301.emcy cia301.frame cia301.nmt "
         "cia301.node_guarding cia301.pdo cia301.sdo_client drives.axis "
-        "drives.canopen_node drives.drive_group drives.drive_snapshot drives.release_test drives.odometry_feed "
+        "drives.canopen_node drives.drive_group drives.drive_snapshot drives.feedback_factor drives.release_test "
+        "drives.odometry_feed "
         "drives.sdo_stop drives.signs_of_life drives.stall drives.standstill drives.stopping_distance drives.telemetry "
         "motion.braking motion.kinematics motion.limiter motion.odometry motion.velocity_command "
         "supervision.bus_health supervision.cycle_stats supervision.latch supervision.lifecycle "

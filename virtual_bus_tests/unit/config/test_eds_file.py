@@ -131,7 +131,7 @@ def test_a_file_without_device_info_is_still_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"<?xml version='1.0'?>", ":1: no section describes an object"),
+        (b"<?xml version='1.0'?>", ":1: this is XML (XDD or XDC, CiA 311), which is not read: take the drive's EDS"),
         (b"", ":1: no section describes an object"),
         (b"PK\0\0", "has zero bytes: no EDS file"),
         (b"[1000]\n" * 1_200_000, "is larger than 8000000 bytes"),
@@ -238,6 +238,36 @@ def test_what_is_no_eds_has_exit_code_2(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, "nothing"))])
     assert result.exit_code == 2
     assert "drive.eds:1: no section describes an object" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "doubt"),
+    [
+        ("", "", ""),
+        ("[1600]\nParameterName=x\nDataType=0x0004\nAccessType=rw", "[1600]\nAccessType=const", "1600h cannot be wri"),
+        ("[6064]\n", "[6064]\nPDOMapping=0\n", "6064h cannot be in a PDO (PDOMapping=0)"),
+        ("[6060]\n", "[6060]\nPDOMapping=0\n", ""),
+        ("[6064]\n", "[6064]\nPDOMapping=1\n", ""),
+        (
+            "[1017]\n",
+            "",
+            "it has no 1017h and sends no heartbeat: canbase needs one, or node guarding with 6007h, which by",
+        ),
+        ("[1017]\n", "[100C]\n[100D]\n[6007]\n", "node guarding with 6007h, which it has (self_stop.node_guarding)"),
+        ("[1017]\n", "[1017]\n[68FF]\n", ""),
+        ("[1017]\n", "[1017]\n[68FF]\n[70FF]\n[78FF]\n", "it has 4 axes, and the first 2 of a node can be used"),
+    ],
+)
+def test_what_an_eds_has_otherwise_than_it_is_needed_is_told_and_stays_in_the_draft(
+    before: str, after: str, doubt: str, tmp_path: Path
+) -> None:
+    text = (WHOLE + "[1017]\n").replace(before, after, 1)
+    result = CliRunner().invoke(app, ["config", "from-eds", str(written(tmp_path, text))])
+    assert result.exit_code == 0
+    assert [line for line in result.stderr.splitlines() if "doubt:" in line and doubt in line] or not doubt
+    assert ("doubt:" in result.stderr) is bool(doubt)
+    assert doubt in result.stdout.partition("title:")[0]
+    assert load_profile(str(written(tmp_path, result.stdout, "drafted.yaml"))).layout.axes <= 2
 
 
 RANGES = """\
