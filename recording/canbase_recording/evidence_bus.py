@@ -14,7 +14,7 @@ from canbase_recording.beat import Beat
 from canbase_recording.cause import Found
 from canbase_recording.frame_words import QUICK_STOP_COB_ID
 from canbase_recording.scene import Scene
-from canbase_recording.trace import Line, first_after, last_before, times_between, value_at
+from canbase_recording.trace import Line, around_times, first_after, last_before, times_between, value_at
 
 LOST_PERIODS: Final = 4.0
 """So many periods without it are no lost frame."""
@@ -34,7 +34,7 @@ _RECEIVES_NOTHING: Final = (0x8130, 0x8250, 0x8120, 0x8140)
 
 def recorder_paused(scene: Scene) -> Found | None:
     """Nothing at all was recorded for a while: neither sent nor received."""
-    times = [at for at in scene.frame_times if scene.reaction_s - 2.0 <= at <= scene.reaction_s + 0.5]
+    times = around_times(scene.frame_times, scene.reaction_s - 2.0, scene.reaction_s + 0.5)
     gaps = [(b - a, a) for a, b in itertools.pairwise(times)]
     if not gaps:
         return None

@@ -10,8 +10,9 @@ from canbase_config.robot import WATCHDOG_NODE_ID
 from canbase_driver.cia301.nmt import TPDO
 from canbase_driver.cia402 import DriveState
 from canbase_recording.cause import Found
+from canbase_recording.evidence_bus import LOST_PERIODS
 from canbase_recording.frame_words import nmt_text
-from canbase_recording.scene import SILENT_PERIODS, Scene
+from canbase_recording.scene import Scene
 from canbase_recording.trace import between, last_before, times_between
 
 SIGNS: Final = 3
@@ -45,8 +46,8 @@ def _foreign_nmt(scene: Scene) -> Found | None:
 
 
 def _has_power(scene: Scene, node_id: int, at_s: float) -> bool:
-    """Whether a node, 0: any, reported operation enabled at this time, and not only long ago."""
-    since_s = at_s - SILENT_PERIODS * scene.period_s
+    """Whether a node, 0: any, reported operation enabled at this time, and not only some cycles ago."""
+    since_s = at_s - LOST_PERIODS * scene.period_s
     return any(
         trace.state_at(at_s) is DriveState.OPERATION_ENABLED and bool(between(trace.status, since_s, at_s))
         for trace in scene.axes.values()

@@ -68,6 +68,8 @@ def velocity_stuck(scene: Scene) -> Found | None:
         changed_s = trace.last_change(trace.velocity, scene.reaction_s)
         samples = between(trace.velocity, (scene.began_s if changed_s is None else changed_s) - 1e-9, scene.reaction_s)
         scale = 1.0 if trace.has_units else _counts_of_606c(trace, samples[0][0] if samples else scene.began_s)
+        if scale is None and samples:
+            scale = _counts_of_606c(trace, _steady_until(trace, samples[0][0]))
         if len(samples) < SAMPLES or scale is None or _stands_since(trace, scene) is not None:
             continue
         shown = trace.speed(samples[-1][1]) * scale
@@ -94,6 +96,12 @@ def _counts_of_606c(trace: AxisTrace, until_s: float) -> float | None:
 
 
 LEAST_COUNTS: Final = 100.0
+
+
+def _steady_until(trace: AxisTrace, since_s: float) -> float:
+    """Until when the setpoint of this time holds: its 606Ch and 6064h may show one speed."""
+    held = value_at(trace.target, since_s)
+    return next((at_s for at_s, raw in between(trace.target, since_s, math.inf) if raw != held), since_s)
 
 
 def _differs_since(trace: AxisTrace, shown: float, times: list[float]) -> float | None:

@@ -49,6 +49,8 @@ def _first_hold(scene: Scene) -> FilterNote | None:
         if note.at_s > scene.reaction_s + SLACK_S:
             break
         holds = note.cause is not StopCause.NONE and not note.orders_motion
+        if note.at_s > scene.reaction_s and first is not None and not holds:
+            break
         first = None if not holds else first if first is not None and first.cause is note.cause else note
     return first
 
@@ -63,7 +65,7 @@ def source_lost(scene: Scene) -> Found | None:
             break
         if not note.active and before and note.at_s >= scene.reaction_s - SLACK_S:
             return Found(note.at_s, f"velocity_mux follows {before} no longer: {note.detail or 'no source'}")
-        before = note.active or before
+        before = note.active
     return None
 
 

@@ -25,6 +25,8 @@ SIGNS: Final = frozenset(
 """Alarms that report, and stop nothing themselves."""
 SIGN_S: Final = 1.0
 """A sign this long before the first part acts is a story of its own [s]."""
+LEAST_ENTRIES: Final = 200
+"""So many before it belong to a stop in any case: those before a long pause."""
 MOST_STOPS: Final = 12
 MOST_ENTRIES: Final = 300_000
 MOST_EVENTS: Final = 2_000
@@ -54,7 +56,7 @@ class StoryFinder:
         ring.append(entry)
         if self._began_s is None:
             oldest = entry.at_s - BEFORE_S
-            while ring[0].at_s < oldest:
+            while ring[0].at_s < oldest and len(ring) > LEAST_ENTRIES:
                 ring.popleft()
 
     def on_event(self, event: Event) -> None:

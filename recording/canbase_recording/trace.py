@@ -153,6 +153,11 @@ def times_between(times: Sequence[float], since_s: float, until_s: float) -> Seq
     return times[bisect.bisect_right(times, since_s) : bisect.bisect_right(times, until_s)]
 
 
+def around_times(times: Sequence[float], since_s: float, until_s: float) -> Sequence[float]:
+    """The same, with the last one before them."""
+    return times[max(bisect.bisect_right(times, since_s) - 1, 0) : bisect.bisect_right(times, until_s)]
+
+
 def last_before(times: Sequence[float], at_s: float) -> float:
     """The last time at or before; minus infinity: none."""
     at = bisect.bisect_right(times, at_s)

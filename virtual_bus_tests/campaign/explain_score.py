@@ -1,14 +1,16 @@
 """`python -m campaign.explain_score --scenarios 300`: recordings whose truth is known; is `canbase explain` right?
 
 Each seed is one scenario in virtual time: ordinary use (a goal, the joystick, a stop and its reset, a power cycle),
-then one failure, or none. It is explained from the driver's black box and from a listener's frames, with and without
-robot.yaml, cut at both ends, with gaps in a node's frames, and read from ASC, BLF, TRC and candump files. Each answer
-is right, "cannot tell", or wrong. `--seed 7` tells one. Exit code 1: more than one answer of a hundred is wrong.
+then one failure, none, or stops in turn: at standstill, two within 3 s, or one after a long hang. It is explained
+from the driver's black box and from a listener's frames, with and without robot.yaml, cut at both ends, with gaps in
+a node's frames, and read from ASC, BLF, TRC and candump files. Each answer is right, "cannot tell", or wrong. `--seed
+7` tells one. Exit code 1: more than one answer of a hundred is wrong.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 from bisect import bisect_left, bisect_right
@@ -30,8 +32,10 @@ from canbase_campaign.scenario import Start
 from canbase_campaign.twins import GOAL, TWINS, Twin
 from canbase_config.object_map import POSITION_ACTUAL
 from canbase_config.robot import Robot
+from canbase_driver.causes import DriverCause
+from canbase_driver.runtime import black_box_notes as notes
 from canbase_recording.cause import Cause
-from canbase_recording.entry import Entry, FrameKind, RecordedFrame
+from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.explanation import Explanation, explain
 from canbase_recording.recording_file import RecordingFile
 from canbase_recording.standstill import WheelStop
@@ -56,6 +60,11 @@ NO_ANSWER: Final = (Cause.UNKNOWN, Cause.REPORTED)
 WEAK: Final = (Cause.WHEEL_SLOW, Cause.NO_MOTION)
 """Of a wheel that gets ever slower."""
 LOST: Final = (Cause.FEEDBACK_LOST, Cause.NODE_SILENT)
+APPROACH_S: Final = 3.0
+"""The base drives ever slower towards an obstacle, before it is stopped for it."""
+BOX_S: Final = 10.0
+"""`black_box.seconds`."""
+TITLE: Final = notes.title("motor_driver", DriverCause.STOP_REQUESTED.value, "service motor_driver/stop")
 FILES: Final = (".asc", ".blf", ".trc", ".log")
 
 FAILED: Final = (
@@ -106,6 +115,8 @@ class Play:
         self.world.random.seed(seed)
         self.recorder, self.truth = WorldRecorder(self.world), Truth(self.world.robot)
         self.ordered: Twist | None = None
+        self.boxed_s = math.nan
+        """When a stop was requested at standstill, and the driver wrote its black box [s]."""
         self._push()
 
     def run(self) -> None:
@@ -116,6 +127,8 @@ class Play:
         if self.world.driver.core.state is not DriverState.ENABLED or self.random.random() < 0.15:
             self._joystick()
             self._note("nothing fails")
+            if self.world.driver.core.state is DriverState.ENABLED:
+                self.random.choice((self._releases, self._stop_at_rest, self._stop_twice, self._hang))()
         else:
             self._fail(*self.random.choice(FAILED))
         self._rest()
@@ -197,6 +210,35 @@ class Play:
         self._rest()
         self._resets()
 
+    def _stop_at_rest(self) -> None:
+        self._pass(self.random.uniform(0.5, 9.5))
+        self._episode("stop requested at standstill", Cause.STOP_REQUESTED, None)
+        self.boxed_s = self.recorder.now_s
+        self.world.driver.stop()
+        self._rest()
+
+    def _stop_twice(self) -> None:
+        self._stop_at_rest()
+        self.ordered = ZERO
+        while self.world.driver.core.state is not DriverState.ENABLED:
+            self.world.velocity.reset()
+            self.world.driver.reset([])
+            self._pass(0.3)
+        self.ordered = Twist(self.random.uniform(0.2, 0.4), 0.0)
+        self._pass(self.random.uniform(0.8, 2.2))
+        self._episode("stop requested", Cause.STOP_REQUESTED, None)
+        self.world.driver.stop()
+        self._rest()
+
+    def _hang(self) -> None:
+        self._drives()
+        self._episode("motor_driver hangs", Cause.RECORDER_PAUSED, Cause.DRIVER_SILENT)
+        self.world.processes["driver"].hang("explain")
+        self._pass(self.random.uniform(BOX_S, 2.0 * BOX_S))
+        self.world.processes["driver"].go_on("explain")
+        self._resets()
+        self._stop_at_rest()
+
     def _power_cycle(self) -> None:
         self._drives()
         self._episode("a drive without power", Cause.NODE_RESTARTED, Cause.NODE_RESTARTED)
@@ -249,13 +291,15 @@ class View:
     until_s: float
     lost: tuple[int, float, float]
     file: str
+    title: str = ""
+    """Of a black box that was written for its last stop."""
 
     def __str__(self) -> str:
         node, since_s, until_s = self.lost
         words = [f"{self.name} from {self.from_s:.2f} to {self.until_s:.2f} s"]
         words += ["without robot.yaml"] if self.robot is None else []
         words += [f"node {node} lost from {since_s:.2f} to {until_s:.2f} s"] if node else []
-        return ", ".join((*words, *filter(None, (self.file,))))
+        return ", ".join((*words, *filter(None, (self.file, self.title))))
 
 
 def views(play: Play) -> Iterator[View]:
@@ -274,6 +318,9 @@ def views(play: Play) -> Iterator[View]:
             file = draw.choice(("", *FILES)) if name == WIRE else ""
             lost = (node, lost_s, lost_s + draw.uniform(0.15, 2.5)) if node else (0, 0.0, 0.0)
             yield View(name, entries, robot, from_s, until_s, lost, file)
+    if play.boxed_s > 0.0:
+        from_s, nothing = max(0.0, play.boxed_s - BOX_S), (0, 0.0, 0.0)
+        yield View(BOX, play.recorder.box, play.world.robot, from_s, play.boxed_s, nothing, "", TITLE)
 
 
 def read(view: View) -> tuple[float, list[Entry]]:
@@ -286,7 +333,7 @@ def read(view: View) -> tuple[float, list[Entry]]:
                  and 0x180 <= entry.cob_id < 0x580 and lost_s <= entry.at_s <= found_s)
     ]  # fmt: skip
     if not view.file or not entries:
-        return 0.0, entries
+        return 0.0, [Note(entries[0].at_s, view.title), *entries] if view.title else entries
     with tempfile.TemporaryDirectory(prefix="canbase-explain-") as folder:
         path = Path(folder) / f"recording{view.file}"
         with can.Logger(str(path)) as logger:
@@ -335,8 +382,10 @@ def judge(seed: int, view: View, truth: Truth) -> Answer:
             wrong.append(f"{story.cause.value} at {found_s:.3f} s: {story.found.text}")
         wrong += _standstills(story, told, entries, shift_s, truth)
     for at, episode in enumerate(truth.episodes):
-        is_in = view.from_s + SEEN_S + 0.3 <= episode.at_s <= view.until_s - SEEN_S - 1.3
         expected = episode.causes[view.name]
+        late_s = APPROACH_S if expected is Cause.OBSTACLE else 1.3
+        is_in = view.from_s + SEEN_S + 0.3 <= episode.at_s <= view.until_s - SEEN_S - late_s
+        is_in = is_in or (bool(view.title) and episode.at_s == view.until_s)
         if expected is not None and is_in and at not in said:
             wrong.append(f"{expected.value} at {episode.at_s:.3f} s is not told")
     unknown = any(story.cause in NO_ANSWER for story in told.stories)
@@ -350,10 +399,10 @@ def _is_lost(view: View, story: Story, found_s: float) -> bool:
 
 
 def _is_cut(story: Story, cause: Cause | None) -> bool:
-    """The boot-up of the node comes after the end."""
+    """The boot-up of the node, or its EMCY, comes after the end."""
     return (
         story.cause is Cause.NODE_SILENT
-        and cause is Cause.NODE_RESTARTED
+        and cause in (Cause.NODE_RESTARTED, Cause.DRIVES_DEAF)
         and story.scene.ended_s < story.found.at_s + 1.0
     )
 

@@ -144,3 +144,61 @@ def test_a_wheel_without_position_at_the_cause_proves_no_standstill() -> None:
     (story,) = stories(cut)
     left = next(wheel for wheel in story.standstill.wheels if wheel.name == "left_wheel")
     assert (left.stood_s, left.why_not[:15]) == (None, "6064h begins at")
+
+
+@pytest.mark.parametrize("hangs_s", [3.0, 12.0])
+def test_a_pause_of_the_driver_is_seen_in_its_black_box_however_long_it_was(hangs_s: float) -> None:
+    robot = Robot()
+    robot.wait(1.0)
+    robot.world.processes["driver"].hang("a test")
+    robot.wait(hangs_s)
+    robot.world.processes["driver"].go_on("a test")
+    robot.wait(1.0)
+    (story,) = stories(robot.recorder.box)
+    assert story.cause is Cause.RECORDER_PAUSED
+    assert story.found.at_s == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_source_that_ended_long_ago_is_not_lost_at_the_stop() -> None:
+    """The mux reports each 0.1 s that nobody drives."""
+    notes = [
+        Note(0.1, written.mux_note("action", "")),
+        *(Note(0.1 * turn, written.mux_note("", f"action: no message for {turn / 10} s")) for turn in range(3, 21)),
+        Note(2.01, written.driver_note("STOPPING: stop requested (service motor_driver/stop)")),
+    ]
+    (story,) = stories([Note(0.0, "motor_driver ENABLED"), *notes])
+    assert story.cause is Cause.STOP_REQUESTED
+
+
+def test_a_filter_that_stops_and_lets_creep_in_turn_stopped_for_the_obstacle() -> None:
+    notes = [
+        Note(0.9, written.command_note(0.02, 0.0)),
+        Note(0.95, written.filter_note("obstacle_near", "0.15 m free ahead", 0.02, 0.0, 1)),
+        Note(1.0, written.filter_note("obstacle", "0.15 m free ahead", 0.0, 0.0, 2)),
+        Note(1.015, written.filter_note("obstacle_near", "0.15 m free ahead", 0.02, 0.0, 3)),
+    ]
+    (story,) = stories([Note(0.0, "motor_driver ENABLED"), *notes])
+    assert story.cause is Cause.OBSTACLE
+
+
+@pytest.mark.parametrize(("age_s", "is_told"), [(0.06, False), (0.01, True)])
+def test_a_drive_that_is_not_in_the_recording_any_more_is_not_known_to_have_power(age_s: float, is_told: bool) -> None:
+    """Its last frame ── a reset, as the driver's boot sends it."""
+    lost_s = 0.5
+    wire = [
+        entry for entry in recorded(twin("drive", "in fault")).wire
+        if isinstance(entry, RecordedFrame) and (entry.at_s < lost_s or (entry.at_s < 1.0 and entry.cob_id & 0x7F != 2))
+    ]  # fmt: skip
+    reset = RecordedFrame(lost_s + age_s, 0x000, bytes((0x82, 2)))
+    told = stories([*(e for e in wire if e.at_s < reset.at_s), reset, *(e for e in wire if e.at_s >= reset.at_s)])
+    assert (Cause.SECOND_MASTER in [story.cause for story in told]) == is_told
+
+
+def test_a_boot_up_long_after_the_reset_of_the_boot_is_a_restart() -> None:
+    """Reset ── its boot-up ── power ── a boot-up that nobody ordered, in the network of another master."""
+    frames = [RecordedFrame(0.01 * turn, 0x080, b"") for turn in range(260)]
+    frames += [RecordedFrame(0.01 * turn + 0.001, 0x181, b"\x37\x12" + bytes(4)) for turn in range(50, 200)]
+    frames += [RecordedFrame(0.1, 0x000, bytes((0x82, 1)))]
+    frames += [RecordedFrame(at_s, 0x701, b"\0") for at_s in (0.11, 1.995)]
+    (story,) = stories(sorted(frames, key=lambda frame: frame.at_s))
+    assert story.cause is Cause.NODE_RESTARTED

@@ -43,7 +43,7 @@ def test_the_first_cause_of_more_failures(failure: Twin, box: Cause | None, wire
         assert causes == ([] if expected is NO_STOP else [expected])
 
 
-NEEDS_UNITS = (Cause.ENCODER_JUMPS, Cause.VELOCITY_STUCK)
+NEEDS_UNITS = (Cause.ENCODER_JUMPS,)
 
 
 @pytest.mark.parametrize(("what", "how", "box", "wire"), FAILURES, ids=[f"{row[0]}: {row[1]}" for row in FAILURES])
