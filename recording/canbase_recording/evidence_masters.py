@@ -38,11 +38,22 @@ def nmt_command(scene: Scene) -> Found | None:
 
 def _foreign_nmt(scene: Scene) -> Found | None:
     for at_s, (command, node_id, sent) in scene.nmt:
-        before = scene.reaction_s - 0.5 <= at_s <= min(scene.reaction_s, scene.tripped_s)
+        before = scene.reaction_s - 0.5 <= at_s <= min(scene.reaction_s, _ladder_begins_s(scene))
         if before and not sent and command in _STOPPING and _has_power(scene, node_id, at_s):
             text = nmt_text(bytes((command, node_id)))
             return Found(at_s, f"somebody sent {text}, while a drive had power", node_id)
     return None
+
+
+def _ladder_begins_s(scene: Scene) -> float:
+    """From when on an NMT command may be the watchdog's: it reports its trip a little after its first frames. For
+    another master's command it trips afterwards."""
+    causes = (state.cause for at_s, state in scene.watchdog if at_s == scene.tripped_s)
+    return scene.tripped_s - (0.0 if next(causes, 0) == FOREIGN_MASTER else LADDER_S)
+
+
+FOREIGN_MASTER: Final = 8
+LADDER_S: Final = 0.02
 
 
 def _has_power(scene: Scene, node_id: int, at_s: float) -> bool:

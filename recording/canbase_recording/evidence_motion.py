@@ -100,8 +100,8 @@ LEAST_COUNTS: Final = 100.0
 
 def _steady_until(trace: AxisTrace, since_s: float) -> float:
     """Until when the setpoint of this time holds: its 606Ch and 6064h may show one speed."""
-    held = value_at(trace.target, since_s)
-    return next((at_s for at_s, raw in between(trace.target, since_s, math.inf) if raw != held), since_s)
+    targets = around(trace.target, since_s, math.inf)
+    return next((at_s for at_s, raw in targets if raw != targets[0][1]), since_s)
 
 
 def _differs_since(trace: AxisTrace, shown: float, times: list[float]) -> float | None:

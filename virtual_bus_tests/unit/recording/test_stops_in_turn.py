@@ -202,3 +202,12 @@ def test_a_boot_up_long_after_the_reset_of_the_boot_is_a_restart() -> None:
     frames += [RecordedFrame(at_s, 0x701, b"\0") for at_s in (0.11, 1.995)]
     (story,) = stories(sorted(frames, key=lambda frame: frame.at_s))
     assert story.cause is Cause.NODE_RESTARTED
+
+
+def test_the_watchdog_s_nmt_command_just_before_it_reports_its_trip_is_no_other_master_s() -> None:
+    """The recording has lost its quick stops."""
+    box = recorded(twin("encoder", "frozen: nothing counts, the last speed")).box
+    trip = next(e for e in box if isinstance(e, RecordedFrame) and e.cob_id == 0x1FE and e.data[0] == 2)
+    cut = [e for e in box if not (isinstance(e, RecordedFrame) and e.cob_id & 0x780 == 0x500 and e.at_s < trip.at_s)]
+    (story,) = stories(cut)
+    assert story.cause is Cause.POSITION_STUCK
