@@ -61,7 +61,7 @@ else
 endif
 
 .PHONY: nightly
-nightly: $(VENV)/ready ## seeds of today that never ran: campaign, lies, odd drives, ordinary driving, Hypothesis; DATE=2026-12-01 repeats a night, SHARE=0.1 a part of it
+nightly: $(VENV)/ready ## seeds of today that never ran: campaign, lies, odd drives, ordinary driving, explain, Hypothesis; DATE=2026-12-01 repeats a night, SHARE=0.1 a part of it
 	PYTHONPATH=$(CURDIR)/virtual_bus_tests python -m campaign.nightly $(if $(DATE),--date $(DATE)) $(if $(SHARE),--share $(SHARE)) $(if $(ONLY),--only $(ONLY))
 
 HOT_SOURCES := $(wildcard can_config/canbase_config/*.py runtime/*/*.py driver/canbase_driver/*.py \

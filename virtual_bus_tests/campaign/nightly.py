@@ -80,6 +80,15 @@ def ordinary(night: Night) -> Iterator[str]:
             yield f"{driven.trip.what}: make soak SEED={driven.seed}"
 
 
+def explained(night: Night) -> Iterator[str]:
+    """`canbase explain` on recordings whose truth is known: no wrong claim at all."""
+    from campaign import explain_score  # which draws its seeds as this module does
+
+    wrong = [answer for answer in explain_score.answers(night.seeds(explain_score.SCENARIOS)) if answer.wrong]
+    for answer in wrong:
+        yield f"{answer.wrong[0]}: python -m campaign.explain_score --seed {answer.seed}"
+
+
 def examples(night: Night) -> Iterator[str]:
     """Hypothesis: new examples, and each failing one as short as it can be."""
     files = [str(path) for path in sorted(TESTS.rglob("test_*.py")) if "hypothesis" in path.read_text(encoding="utf-8")]
@@ -99,6 +108,7 @@ STEPS: dict[str, Callable[[Night], Iterator[str]]] = {
     "regressions": named,
     "odd": odd_drives,
     "soak": ordinary,
+    "explain": explained,
     "hypothesis": examples,
 }
 
