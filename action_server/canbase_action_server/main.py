@@ -21,6 +21,7 @@ from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
+from canbase_runtime.ros_end import end_ros
 
 DELIVERY_S = 0.2
 """After the last result, for the middleware to hand it over."""
@@ -49,8 +50,7 @@ def run(robot: Robot, ros_args: list[str], when_ready: Callable[[], None] = lamb
     finally:
         node.order_stop()
         executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
+        end_ros(node)
     return 0 if node.failure is None else 1
 
 

@@ -25,6 +25,7 @@ from canbase_runtime.foreign_text import NAME_LENGTH, SENTENCE_LENGTH, clean, pr
 from canbase_runtime.last_message import NOT_RECEIVED, LastMessage
 from canbase_runtime.message_reader import MessageReader
 from canbase_runtime.receive_time import ReceiveTimes
+from canbase_runtime.ros_end import end_ros
 
 POLL_S: Final = 0.1
 GAP_S: Final = 1.0
@@ -90,7 +91,7 @@ class RobotTopics:
 
     def close(self) -> None:
         """ROS ends."""
-        rclpy.try_shutdown()
+        end_ros(self._node)
 
 
 def _last(kept: tuple[Any, float] | None, now_s: float) -> LastMessage:

@@ -25,6 +25,7 @@ from canbase_config.stopping import standstill_s
 from canbase_runtime.latch_file import LatchFile, LatchKeeper
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
+from canbase_runtime.ros_end import end_ros
 from canbase_velocity.filter_node import FilterNode
 from canbase_velocity.input_ring import InputRing
 from canbase_velocity.mux_node import MuxNode
@@ -58,7 +59,7 @@ def run(robot: Robot, ros_args: Sequence[str], when_ready: Callable[[], None] = 
         try:
             _run_nodes(robot, folder, received, when_ready)
         finally:
-            rclpy.shutdown()
+            rclpy.try_shutdown()
     return 0
 
 
@@ -93,8 +94,7 @@ def _run_nodes(robot: Robot, folder: Path, received: list[int], when_ready: Call
         keeper.finish(WRITE_S)
         recorder.finish(WRITE_S)
         executor.shutdown()
-        safety.destroy_node()
-        mux.destroy_node()
+        end_ros(safety, mux)
 
 
 def _order_zero(mux: MuxNode, safety: FilterNode, wait: Callable[[], None], until_s: float) -> None:

@@ -28,6 +28,7 @@ from canbase_runtime.foreign_text import SENTENCE_LENGTH, clean, printable
 from canbase_runtime.last_message import NOT_RECEIVED, LastMessage
 from canbase_runtime.message_reader import MessageReader
 from canbase_runtime.receive_time import ReceiveTimes
+from canbase_runtime.ros_end import end_ros
 from canbase_web.hold import Speed
 from canbase_web.now_view import Robot
 
@@ -154,15 +155,15 @@ class RobotLink:
     def close(self) -> None:
         """Cancel what runs; then ROS ends."""
         self.goals.close()
-        rclpy.try_shutdown()
+        end_ros(self.goals.node, self._node)
 
 
 class Goals:
     """One goal of drive_distance at a time, in a thread of its own. `text`: how it stands, for the person."""
 
     def __init__(self) -> None:
-        self._node = rclpy.create_node("canbase_web_goals", enable_rosout=False, start_parameter_services=False)
-        self._client = DriveClient(self._node)
+        self.node = rclpy.create_node("canbase_web_goals", enable_rosout=False, start_parameter_services=False)
+        self._client = DriveClient(self.node)
         self._thread: threading.Thread | None = None
         self._canceled = threading.Event()
         self.text = "no goal yet: its progress and its result will be here"

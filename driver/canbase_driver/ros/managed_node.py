@@ -51,6 +51,11 @@ class ManagedNode(LifecycleNode):
         if loop.aimed_at is Aim.ACTIVE:
             self.trigger_activate()
 
+    def destroy_node(self) -> None:
+        """rclpy leaves the state machine, which keeps the node in the graph."""
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
     def _on_change_state(self, asked: Asked) -> None:
         try:
             aim = self._begin(asked)

@@ -14,6 +14,7 @@ from canbase.msg import DriverStatus, SafetyState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, JointState
 
@@ -107,6 +108,11 @@ class MotorDriverNode(ManagedNode):
     def deliver(self) -> None:
         """Send the answers for which the black box has done its work; from the executor's thread."""
         self._records.deliver()
+
+    @property
+    def and_black_box(self) -> tuple[Node, ...]:
+        """All nodes of the process, in the order of their end."""
+        return self, self._stops.orders.node
 
     def end(self) -> None:
         """The control thread has ended: report the stops that are still open."""

@@ -45,15 +45,13 @@ class SourceOrders:
         depth = min(MOST_KEPT, math.ceil(seconds * FASTEST_HZ))
         qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._depth = depth
-        self._node = rclpy.create_node(
-            NODE, context=beside.context, enable_rosout=False, start_parameter_services=False
-        )
+        self.node = rclpy.create_node(NODE, context=beside.context, enable_rosout=False, start_parameter_services=False)
         self._kept: dict[str, deque[EventEntry]] = {name: deque(maxlen=depth) for name in robot.mux.sources}
         """What was taken for the last recording, which may overlap the next one."""
         self._subscriptions: dict[str, Any] = {}
         for name, source in robot.mux.sources.items():
             try:
-                self._subscriptions[name] = self._node.create_subscription(_kind(source), source.topic, _unused, qos)
+                self._subscriptions[name] = self.node.create_subscription(_kind(source), source.topic, _unused, qos)
             except rclpy_implementation.RCLError as error:  # SROS2 may forbid it; the driver drives all the same
                 beside.get_logger().warning(f"the black box cannot hear {source.topic} of source {name}: {error}")
 

@@ -47,7 +47,7 @@ class StopEvents:
         self._robot_name = robot.name
         self._ring = ring
         self._writer = writer
-        self._orders = SourceOrders(node, robot, ring.seconds)
+        self.orders = SourceOrders(node, robot, ring.seconds)
         self._estop_latches = robot.safety.estop.latched
         patience_s = given_up_s(robot) + POWER_OFF_TIMEOUT_S
         self._recorder = StopHistory(patience_s)
@@ -123,7 +123,7 @@ class StopEvents:
 
     def _write(self, report: StopReport, now_s: float) -> str:
         offset_s = time.time() - now_s
-        return self._writer.submit(self._ring.cut(now_s, offset_s), report.record, self._orders.during)
+        return self._writer.submit(self._ring.cut(now_s, offset_s), report.record, self.orders.during)
 
     def record(self, done: Written) -> str:
         """Have the last seconds written though nothing has stopped the base; from the executor's thread.
@@ -134,7 +134,7 @@ class StopEvents:
         offset_s = time.time() - now_s
         record = StopRecord(NOBODY, "recording requested", "the robot was not stopped", False, "", now_s)
         keep = functools.partial(self._ring.cut_later, now_s, offset_s)
-        return self._writer.request(keep, record, offset_s, self._orders.during, done)
+        return self._writer.request(keep, record, offset_s, self.orders.during, done)
 
     def _on_mux(self, message: MuxState) -> None:
         now_s, active = time.monotonic(), printable(message.active)

@@ -37,6 +37,7 @@ from canbase_runtime.latch_file import LatchFile, LatchKeeper
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
+from canbase_runtime.ros_end import end_ros
 
 WAKE_S = 0.02
 """An outcome of the control thread waits at most this long for the next message before it is answered [s]."""
@@ -100,13 +101,13 @@ def run(
         publisher.join(1.0)
         keeper.finish(WRITE_S)
         writer.finish(WRITE_S)
+        failure = failure or loop.failure
+        if failure is not None:
+            node.event_log.write(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
+            sys.excepthook(type(failure), failure, failure.__traceback__)
     finally:
-        rclpy.shutdown()
         claim.close()
-    failure = failure or loop.failure
-    if failure is not None:
-        node.event_log.write(f"ended by {type(failure).__name__}: {failure}", Priority.ERROR, robot=robot.name)
-        sys.excepthook(type(failure), failure, failure.__traceback__)
+        end_ros(*node.and_black_box)
     return 0 if failure is None else 1
 
 
