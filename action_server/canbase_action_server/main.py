@@ -16,10 +16,10 @@ from rclpy.signals import SignalHandlerOptions
 from canbase_action_server.drive_messages import drive_binding
 from canbase_action_server.node import DriveDistanceServer
 from canbase_action_server.rotate_messages import rotate_binding
+from canbase_base.output import never_wait
 from canbase_base.sd_notify import Service
 from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
-from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
 from canbase_runtime.ros_end import end_ros
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from canbase_base.latch_file import create_first
 from canbase_base.latch_folder import latch_folder
 from canbase_base.own_folder import replaced
 from canbase_base.single_instance import TakenError, bus_name, check
@@ -30,7 +31,6 @@ from canbase_cli.options import (
     ros_needed,
 )
 from canbase_cli.raise_priority import raise_priority
-from canbase_runtime.latch_file import create_first
 from canbase_runtime.own_modules import module_command
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 from canbase_runtime.which_robot import VARIABLE

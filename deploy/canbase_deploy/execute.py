@@ -11,10 +11,10 @@ import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 
+from canbase_base.latch_file import create_first
 from canbase_base.own_folder import open_own_folder, replaced
 from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove, Run, WriteFile
 from canbase_deploy.owner import ETC, old
-from canbase_runtime.latch_file import create_first
 
 COMMAND_S = 60.0
 

@@ -232,8 +232,8 @@ def _shown(paths: Iterable[Path]) -> str:
 
 
 def _record_text(path: Path, robot: str, words: Words) -> str:
+    from canbase_base import latch_record
     from canbase_base.latch_folder import machine
-    from canbase_runtime import latch_record
 
     _, content = read_end(path, latch_record.SIZE + 1)
     found = latch_record.read(content, latch_record.owner_of(path.stem, robot, machine()))

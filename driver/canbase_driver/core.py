@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 
+from canbase_base.latch_record import Found, Record
 from canbase_config import stopping
 from canbase_config.commissioned import without_proof
 from canbase_config.robot import DRIVER_NODE_ID, Robot
@@ -53,7 +54,6 @@ from canbase_driver.supervision.state_machine import StateMachine
 from canbase_driver.supervision.stop_history import StopRecord
 from canbase_driver.supervision.watchdog_link import COUNTERS_COB_ID, STATE_COB_ID, WatchdogLink
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.latch_record import Found, Record
 from canbase_runtime.watchdog_view import WatchdogView
 
 FARTHEST = 1e6

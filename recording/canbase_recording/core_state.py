@@ -16,8 +16,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from canbase_base import latch_record
 from canbase_recording.input_lines import NoInputsError
-from canbase_runtime import latch_record
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.source_standing import SourceStanding
 from canbase_runtime.stop_cause import StopCause
@@ -51,7 +51,7 @@ CLASSES: Final = {
         *(each for module in _MODULES for each in vars(module).values() if isinstance(each, type)),
         *(DriverState, SourceStanding, StopCause),
     ]
-    if kind.__module__.startswith(("canbase_velocity.", "canbase_runtime."))
+    if kind.__module__.startswith(("canbase_velocity.", "canbase_runtime.", "canbase_base."))
 }
 """Of the pure cores: none of them opens or starts anything."""
 BROKEN: Final = (

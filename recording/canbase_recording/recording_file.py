@@ -42,7 +42,7 @@ LATEST_S: Final = 2.0**31 - 1.0
 """Since 1970: later times do not fit into a ROS message."""
 MOST_RESTARTS: Final = 1_000_000
 HEAD_BYTES: Final = 4_096
-WATCHDOGS: Final = b'{"format": 1, "part": "watchdog"'
+WATCHDOGS: Final = (b'{"format": 2, "part": "watchdog"', b'{"format": 1, "part": "watchdog"')
 LINE_BYTES: Final = 200_000
 _SCREEN: Final = re.compile(
     r"\s*\((?P<at>\d+\.\d+)\)\s+(?P<channel>\S+)\s+(?:(?P<way>TX|RX)\s+[-BE ]+\s+)?"

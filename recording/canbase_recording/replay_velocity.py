@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from canbase_base.latch_record import Found, Mark, Record
 from canbase_config.robot import Robot
 from canbase_recording.core_state import BROKEN, restore
 from canbase_recording.input_lines import NoInputsError
 from canbase_recording.velocity_inputs import Call, VelocityConfig, VelocityInputs
 from canbase_runtime.driver_state import driver_state
-from canbase_runtime.latch_record import Found, Mark, Record
 from canbase_velocity.base_ready import status_timeout_s
 from canbase_velocity.decision import Action
 from canbase_velocity.delay import Sent

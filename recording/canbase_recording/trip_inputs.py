@@ -13,10 +13,10 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 
+from canbase_base.latch_record import Found
 from canbase_config.watchdog import WatchdogConfig
 from canbase_recording.input_lines import NoInputsError, Time, first_of, head_of, json_line, read_call, readers
 from canbase_watchdog.input_ring import END, EXPIRE, FORMAT, FRAME, LEASE, MAX_INPUTS, START, SUSPEND, TICK, VERDICT
-from canbase_watchdog.latch import Past
 
 LINE_BYTES: Final = 200_000
 """Of one line."""
@@ -41,7 +41,7 @@ class TripHead:
 
     robot: str
     config: WatchdogConfig
-    past: Past | None
+    past: Found | None
     """The record on disk at the start of that watchdog."""
     trip: RecordedVerdict
     wall_offset_s: Time

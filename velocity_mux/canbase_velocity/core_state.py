@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-OURS: Final = ("canbase_velocity.", "canbase_runtime.")
+OURS: Final = ("canbase_velocity.", "canbase_runtime.", "canbase_base.")
 CONFIG: Final = "canbase_config."
 
 

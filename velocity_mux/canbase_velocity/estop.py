@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import enum
 
-from canbase_runtime.latch_record import Defect, Found, Mark, Record, WriteAhead
+from canbase_base.latch_record import Defect, Found, Mark, Record, WriteAhead
 
 
 class EstopState(enum.Enum):

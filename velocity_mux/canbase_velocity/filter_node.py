@@ -21,14 +21,14 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from canbase_base.latch_file import LatchKeeper
+from canbase_base.latch_record import Record
 from canbase_config.diagnostics import PERIOD_S as DIAGNOSTICS_PERIOD_S
 from canbase_config.robot import Robot
 from canbase_config.safety import Scan as ScanConfig
 from canbase_config.state_age import STATE_PERIOD_S
 from canbase_config.stopping import ramp
 from canbase_runtime.journal import EventLog, Journal
-from canbase_runtime.latch_file import LatchKeeper
-from canbase_runtime.latch_record import Record
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.receive_time import ReceiveTimes
 from canbase_runtime.serialized_message import SerializedTwist

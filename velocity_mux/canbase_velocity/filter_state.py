@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from canbase_base.latch_record import Found, Record
 from canbase_config.safety import Scan as ScanConfig
-from canbase_runtime.latch_record import Found, Record
 from canbase_runtime.received import NEVER, Received
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.clearance import NOWHERE, Clearances, Field, Points, ScanReader, clearances

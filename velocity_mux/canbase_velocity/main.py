@@ -17,13 +17,13 @@ from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_base.latch_file import LatchFile, LatchKeeper
 from canbase_base.latch_folder import SUFFIX, latch_folder
+from canbase_base.output import never_wait
 from canbase_base.sd_notify import Service
 from canbase_base.single_instance import TakenError, hold_record, take
 from canbase_config.robot import Robot
 from canbase_config.stopping import standstill_s
-from canbase_runtime.latch_file import LatchFile, LatchKeeper
-from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
 from canbase_runtime.ros_end import end_ros
 from canbase_velocity.filter_node import FilterNode

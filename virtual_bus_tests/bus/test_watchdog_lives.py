@@ -19,14 +19,13 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 
+from canbase_base.latch_file import LatchFile, LatchKeeper, create_first
+from canbase_base.latch_record import Mark
 from canbase_base.single_instance import TakenError
-from canbase_runtime.latch_file import create_first
 from canbase_watchdog import bus_port as watchdog_bus_port
 from canbase_watchdog import frames, life, loop, main, realtime
 from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.frames import Frame
-from canbase_watchdog.latch import Mark
-from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.observer import Observer
@@ -171,7 +170,7 @@ def test_a_bus_that_comes_back_while_the_drives_run_is_a_latched_stop_until_a_re
     assert answer == Answer.DONE
     rig.watches(time.monotonic())
     rig.end()
-    assert Keeper(rig.record, rig.config.robot).past.entry.mark is not Mark.LATCHED
+    assert LatchFile(rig.record.parent, "watchdog", rig.config.robot).open().record.mark is not Mark.LATCHED
 
 
 # at rest, no power was ever there ── the bus is lost and found ── no trip
@@ -263,11 +262,11 @@ def test_no_life_follows_one_whose_record_could_not_be_written(rig: Rig, monkeyp
     rig.watches(0.0)
     rig.robot.drive_at(300, LONG_S)
 
-    def refuse(keeper: Keeper, entry: object) -> bool:
+    def refuse(keeper: LatchKeeper, entry: object) -> bool:
         keeper.problem = f"{rig.record} cannot be written: Read-only file system"
         return False
 
-    monkeypatch.setattr(Keeper, "_attempt", refuse)
+    monkeypatch.setattr(LatchKeeper, "_attempt", refuse)
     FlakyBus.down = True
     rig.thread.join(timeout=LONG_S)
     assert isinstance(rig.failure, life.RecordError)

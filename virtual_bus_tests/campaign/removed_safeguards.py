@@ -14,7 +14,8 @@ from typing import Any
 
 from canbase_action_server import causes
 from canbase_action_server.outcome import ErrorCode
-from canbase_campaign.disk import StopDisk, WatchdogDisk
+from canbase_base.latch_record import CLEAR, Defect, Found
+from canbase_campaign.disk import StopDisk
 from canbase_driver import core
 from canbase_driver.causes import DriverCause
 from canbase_driver.drives.release_test import ReleaseTest, TorqueEvidence
@@ -27,7 +28,6 @@ from canbase_driver.supervision import fault_reset, state_machine, watchdog_link
 from canbase_driver.supervision.hazards import BLOCKERS, HAZARDS, Blocker, Hazard
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.phases import Phase
-from canbase_runtime.latch_record import CLEAR, Defect, Found
 from canbase_runtime.watchdog_view import WatchdogView
 from canbase_sim.cia301.heartbeat import HeartbeatConsumer
 from canbase_velocity import coverage, filter_state, lock, mux, neutral, obstacle, safety_filter
@@ -39,7 +39,6 @@ from canbase_velocity.sweep import NO_TOUCH
 from canbase_watchdog import frames, ladder, lease, policy, stopper, watchdog
 from canbase_watchdog.hard_braking import HardBraking
 from canbase_watchdog.ladder import RUNGS, Step
-from canbase_watchdog.latch import Past
 from canbase_watchdog.slowing import SlowingWatch
 from canbase_watchdog.standstill import StandstillWatch
 from canbase_watchdog.stopper import Stopper
@@ -114,25 +113,27 @@ def _no_estop(self: filter_state.SafetyFilter, now_s: float) -> None:
 
 def _no_records() -> None:
     """Whatever stands on the disk, a driver and a filter that start find that nothing was latched."""
-    found = StopDisk.found
-    StopDisk.found = lambda self: found(StopDisk("driver"))  # type: ignore[method-assign]
+    _clear_for("driver", "velocity")
 
 
 def _watchdog_forgets() -> None:
     """Whatever stands on the disk, a watchdog that starts finds that it had not tripped."""
-    past = WatchdogDisk.past
-    WatchdogDisk.past = lambda self: past(WatchdogDisk())  # type: ignore[method-assign]
+    _clear_for("watchdog")
+
+
+def _clear_for(*parts: str) -> None:
+    found = StopDisk.found
+    StopDisk.found = lambda self: found(StopDisk(self.part) if self.part in parts else self)  # type: ignore[method-assign]
 
 
 def _unreadable_is_clear() -> None:
     """A record of stops that cannot be read counts as an empty one."""
-    found, past = StopDisk.found, WatchdogDisk.past
+    found = StopDisk.found
 
     def found_or_clear(self: StopDisk) -> Found:
         return CLEAR if found(self).defect is not Defect.NONE else found(self)
 
     StopDisk.found = found_or_clear  # type: ignore[method-assign]
-    WatchdogDisk.past = lambda self: Past() if past(self).problem else past(self)  # type: ignore[method-assign]
 
 
 def _resets_while_commanded() -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from canbase_runtime import latch_record
-from canbase_runtime.latch_record import SLOT, Defect, Found, Record
-from canbase_watchdog import latch
-from canbase_watchdog.latch import Entry, Past
+from canbase_base import latch_record
+from canbase_base.latch_record import SLOT, Defect, Found, Record
 
 FULL = "the record of stops cannot be written: no space left on device"
 
@@ -39,9 +37,10 @@ class _File:
 
 
 class StopDisk:
-    """The record of a part that keeps canbase_config's: driver or filter."""
+    """The record of driver, watchdog or filter."""
 
     def __init__(self, part: str, robot: str = "robot") -> None:
+        self.part = part
         self._owner = latch_record.owner_of(part, robot, "virtual")
         self.file = _File(latch_record.whole(Record(), self._owner))
         self._last: Record | None = None
@@ -65,32 +64,3 @@ class StopDisk:
             self._last = record
             self.file.put(latch_record.slot(record, self.file.next, self._owner), self.file.next)
         return record, ""
-
-
-class WatchdogDisk:
-    """The watchdog's record."""
-
-    def __init__(self, robot: str = "robot") -> None:
-        self._owner = latch.owner(robot, "virtual")
-        self.file = _File(latch.page(Entry(), 1, self._owner) + latch.page(Entry(), 2, self._owner))
-        self._last: Entry | None = None
-
-    def past(self) -> Past:
-        """What a watchdog finds that starts now."""
-        return latch.decode(bytes(self.file.data or b""), self._owner)
-
-    @property
-    def readable(self) -> bool:
-        """A watchdog that starts now can read it."""
-        return not self.past().problem
-
-    def write(self, entry: Entry) -> tuple[Entry | None, str]:
-        """On disk at once, or not before the disk answers again; the report to the watchdog."""
-        if not self.file.writable:
-            return None, FULL
-        if self.file.hangs:
-            return self._last, ""
-        if entry is not self._last:
-            self._last = entry
-            self.file.put(latch.page(entry, self.file.next, self._owner), self.file.next)
-        return entry, ""

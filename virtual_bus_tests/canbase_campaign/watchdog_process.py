@@ -6,7 +6,7 @@ import math
 
 from canbase_campaign.can_bus import REMOTE, CanBus
 from canbase_campaign.clock import FINE, ComputerClock, Pace
-from canbase_campaign.disk import WatchdogDisk
+from canbase_campaign.disk import StopDisk
 from canbase_campaign.process import FRAMES_HELD, Process
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.watchdog import Answer, State, Watchdog
@@ -21,7 +21,7 @@ class WatchdogProcess(Process):
         super().__init__(clock)
         self._config, self._tick_s = config, pace.watchdog_tick_s
         self._failed_since = math.inf
-        self.disk = WatchdogDisk()
+        self.disk = StopDisk("watchdog")
         """Its record of a trip, which outlives it."""
         self._member = bus.join(self.name, self)
         self.begin()
@@ -57,7 +57,7 @@ class WatchdogProcess(Process):
 
     def begin(self) -> None:
         """A new core, which knows of a trip before by its record."""
-        self.core = Watchdog(self._config, self.clock.now_s, self.disk.past())
+        self.core = Watchdog(self._config, self.clock.now_s, self.disk.found())
         self._suspended_s = self.clock.suspended_s
         self.every(self._tick_s, self._on_tick, phase_s=0.001)
 

@@ -12,6 +12,7 @@ SOURCES = {
     "canbase_velocity": "velocity_mux",
     "canbase_watchdog": "watchdog",
     "canbase_action_server": "action_server",
+    "canbase_base": "runtime",
     "canbase_runtime": "runtime",
     "canbase_sim": "virtual_bus_tests",
     "canbase_campaign": "virtual_bus_tests",
@@ -19,9 +20,10 @@ SOURCES = {
 """Packages of which a compiled world has a copy, and where each of them lies."""
 HOT = {
     "canbase_config": "watchdog",
-    "canbase_runtime": "driver_state latch_record source_standing stop_cause watchdog_view",
+    "canbase_base": "latch_record",
+    "canbase_runtime": "driver_state source_standing stop_cause watchdog_view",
     "canbase_watchdog": (
-        "bad_cycles bus_health copies counts envelope frames ghost guarding ladder latch lease left_right "
+        "bad_cycles bus_health copies counts envelope frames ghost guarding ladder lease left_right "
         "motion_evidence observer overshoot plausibility policy power_and_motion ramp_to_zero second_master "
         "setpoint_at_rest slowing standstill stopper stopping_distance torque_evidence trip_cause twist "
         "unasked_torque view watchdog"

@@ -88,7 +88,7 @@ TARGETS = (
     _watchdog("watchdog", *STORIES, then=SENSORS),
     _watchdog("observer", then=(*STORIES, *SENSORS)),
     _watchdog("lease"),
-    _watchdog("latch"),
+    _target("runtime/canbase_base", "latch_record", ("runtime/latch_record",), ("runtime/latch_file",)),
     _watchdog("envelope", then=("watchdog/trips", "watchdog/envelope_limiter")),
     _watchdog("left_right"),
     _watchdog("setpoint_at_rest"),

@@ -22,9 +22,9 @@ from typing import Final
 
 import pytest
 
+from canbase_base.latch_file import create_first
 from canbase_base.latch_folder import latch_folder
 from canbase_cli.services import SERVICES
-from canbase_runtime.latch_file import create_first
 from canbase_sim.control import control_path
 from canbase_sim.personality import PERSONALITIES
 from support.crews import robot_with

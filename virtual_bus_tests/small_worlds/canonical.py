@@ -43,7 +43,7 @@ IGNORED = {
         "LeaseBook.refused Observer.dropped BusReport.dropped SdoClient.dropped WatchdogLink.counters "
         "WatchdogState.lease_age_ms"
     ),
-    "a text for people": "Verdict.detail Decision.detail Entry.detail Finding.detail Record.detail",
+    "a text for people": "Verdict.detail Decision.detail Finding.detail Record.detail",
     "what was published last": (
         "VelocityProcess._told VelocityProcess._mux_told Watchdog._reported_status DriverProcess._told Axis._told "
         "DriverProcess.snapshot CanopenNode._measures CanopenNode.report NodeBoot.report"
@@ -69,8 +69,8 @@ IGNORED = {
     "the same object for ever, or told elsewhere: dictionaries, disks": (
         "Process._member Process.clock DriverProcess._topics VelocityProcess._topics DriverProcess._random "
         "VelocityProcess.note DriverCore._handlers Observer._routes CanopenNode._values HeartbeatConsumer._values "
-        "Axis.scale Axis.personality Axis.dictionary Axis.drive _Record.drive WatchdogDisk._owner StopDisk._owner "
-        "StopDisk.file WatchdogDisk.file"
+        "Axis.scale Axis.personality Axis.dictionary Axis.drive _Record.drive StopDisk._owner StopDisk.part "
+        "StopDisk.file"
     ),
     "of a process that hangs: `form` tells its channels and timers": "Process._late Process._kept Process._life",
     "looked at by encoders that come and go, or jump: no event makes one": "Encoder._time_s",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from canbase_campaign.clock import Pace
-from canbase_campaign.disk import StopDisk, WatchdogDisk
+from canbase_campaign.disk import StopDisk
 from canbase_campaign.outside import Surroundings
 from canbase_campaign.process import Process
 from canbase_campaign.robots import campaign_robot
@@ -76,7 +76,7 @@ class SmallWorld:
         self.world.bus.bitrate = math.inf  # type: ignore[assignment]
         self.around: Surroundings = Surroundings(self.world)
         self.parts: tuple[Process, ...] = (self.world.driver, self.world.watchdog, self.world.velocity)
-        self.disks: dict[str, StopDisk | WatchdogDisk] = {
+        self.disks: dict[str, StopDisk] = {
             "driver": self.world.driver.disk,
             "watchdog": self.world.watchdog.disk,
             "velocity": self.world.velocity.disk,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Literal
 
-from canbase_campaign.disk import StopDisk, WatchdogDisk
+from canbase_campaign.disk import StopDisk
 from canbase_config.derive import watchdog_config
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
@@ -80,7 +80,7 @@ class World:
         self._start, self._steps = 100.0, 0
         self.bench = Bench(self.robot, self.now_s, parameters=parameters, odd=odd)
         self._keeps = keeps
-        self.disk, self.watchdog_disk = StopDisk("driver"), WatchdogDisk()
+        self.disk, self.watchdog_disk = StopDisk("driver"), StopDisk("watchdog")
         self.driver: DriverCore | None = DriverCore(self.robot, aim, self.disk.found() if keeps else None)
         self.watchdog: Watchdog | None = None
         self.start_watchdog()
@@ -169,7 +169,7 @@ class World:
 
     def start_watchdog(self) -> None:
         """A new watchdog process."""
-        past = self.watchdog_disk.past() if self._keeps else None
+        past = self.watchdog_disk.found() if self._keeps else None
         self.watchdog = Watchdog(watchdog_config(self.robot), self.now_s, past)
 
     def reboot(self, seconds: float = 0.5) -> None:

@@ -54,14 +54,14 @@ class WatchdogBox:
         self._tick = it._on_tick
         self._end, it.end = it.end, self._on_end
         self._ring = input_ring.InputRing(seconds, -math.inf)  # it began to run long before
-        self._watch = TripWatch(self._ring, it.disk.past())
-        self._past = it.disk.past()
+        self._watch = TripWatch(self._ring, it.disk.found())
+        self._past = it.disk.found()
         it._on_tick = self._on_tick
         it._life += 1
         it.every(it._tick_s, self._on_tick, phase_s=it._tick_s)
 
     def _on_begin(self) -> None:
-        self._past = self._watchdog.disk.past()
+        self._past = self._watchdog.disk.found()
         self._ring = input_ring.InputRing(self._seconds, self._clock.now_s)
         self._watch = TripWatch(self._ring, self._past)
         self._begin()

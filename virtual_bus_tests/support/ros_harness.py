@@ -25,8 +25,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_base.latch_file import create_first
 from canbase_base.latch_folder import latch_folder
-from canbase_runtime.latch_file import create_first
 from support.udp_port import free_udp_port
 
 T = TypeVar("T")

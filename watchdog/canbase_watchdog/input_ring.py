@@ -14,12 +14,12 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from canbase_base.latch_record import Defect, Found, Mark
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.latch import Mark, Past
 from canbase_watchdog.trip_cause import FINE, Verdict
 from canbase_watchdog.watchdog import Watchdog
 
-FORMAT = 1
+FORMAT = 2
 """Grows when a reader of this form would misread a new one."""
 MAX_INPUTS = 80_000
 """A full bus of 1 Mbit/s for nearly ten seconds; about 15 MB in memory, 4 MB in a file."""
@@ -72,7 +72,7 @@ class InputRing:
 class TripWatch:
     """Notes each change of the verdict in the ring, and finds out when the file of a trip is due."""
 
-    def __init__(self, ring: InputRing, past: Past | None) -> None:
+    def __init__(self, ring: InputRing, past: Found | None) -> None:
         """`past`: what the watchdog was made with."""
         self._ring, self._past = ring, past
         self._verdict: Verdict | None = None
@@ -100,10 +100,10 @@ class TripWatch:
     def _has_its_file(self) -> bool:
         """It starts with a trip of an earlier life, which wrote it: each restart would write it again."""
         past = self._past
-        return past is not None and not past.problem and past.entry.mark is Mark.LATCHED
+        return past is not None and past.defect is Defect.NONE and past.record.mark is Mark.LATCHED
 
 
-def head(config: WatchdogConfig, past: Past | None, trip: Trip, wall_offset_s: float) -> dict[str, Any]:
+def head(config: WatchdogConfig, past: Found | None, trip: Trip, wall_offset_s: float) -> dict[str, Any]:
     """The first line of the file. `past`: the record on disk at the start of this watchdog; None: none was kept."""
     return {
         "format": FORMAT,
@@ -111,7 +111,7 @@ def head(config: WatchdogConfig, past: Past | None, trip: Trip, wall_offset_s: f
         "robot": config.robot,
         "trip": dataclasses.asdict(trip),
         "wall_offset_s": wall_offset_s,
-        "past": None if past is None else dataclasses.asdict(past),
+        "past": None if past is None else {**dataclasses.asdict(past), "defect": past.defect.value},
         "config": dataclasses.asdict(config),
     }
 

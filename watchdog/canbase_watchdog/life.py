@@ -12,13 +12,13 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from canbase_base.latch_file import LatchFile, LatchKeeper
 from canbase_base.sd_notify import notify
 from canbase_base.single_instance import TakenError
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames, realtime
 from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.input_ring import InputRing
-from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.loop import BusDeadError, Loop
 from canbase_watchdog.relay import Relay
@@ -50,13 +50,13 @@ def live(config: WatchdogConfig, record: Path, asked: list[int], *, after_loss: 
         uid = os.getuid() if config.lease_uid is None else config.lease_uid
         leases = stack.enter_context(LeaseSocket(config.lease_socket, uid))
         relay = stack.enter_context(Relay(config.relay)) if config.relay else None
-        keeper = Keeper(record, config.robot, must_last=not config.is_virtual)
+        keeper = LatchKeeper(LatchFile(record.parent, "watchdog", config.robot, must_last=not config.is_virtual))
         started_s = time.monotonic()
-        watchdog = Watchdog(config, started_s, keeper.past, loopback=config.hears_itself)
+        watchdog = Watchdog(config, started_s, keeper.found, loopback=config.hears_itself)
         if after_loss and watchdog.status.state is State.TRIPPED:
             _quick_stop(watchdog, bus)
         inputs = InputRing(config.recording_s, started_s)
-        recorder = TripRecorder(inputs, config, keeper.past, folder_of(config, os.environ, Path.home()))
+        recorder = TripRecorder(inputs, config, keeper.found, folder_of(config, os.environ, Path.home()))
         loop = Loop(watchdog, bus, leases, relay, keeper, inputs, recorder)
         lost = False
         try:
@@ -82,7 +82,7 @@ def _listen_for_another(bus: BusPort) -> None:
             )
 
 
-def _guard(loop: Loop, keeper: Keeper, recorder: TripRecorder, asked: list[int], *, quiet: bool) -> None:
+def _guard(loop: Loop, keeper: LatchKeeper, recorder: TripRecorder, asked: list[int], *, quiet: bool) -> None:
     complaint = realtime.prepare()
     if complaint is not None and not quiet:
         _log.warning("%s", complaint)
@@ -98,7 +98,7 @@ def _quick_stop(watchdog: Watchdog, bus: BusPort) -> None:
         bus.send(frame)
 
 
-def _finish(keeper: Keeper, recorder: TripRecorder, *, lost: bool) -> None:
+def _finish(keeper: LatchKeeper, recorder: TripRecorder, *, lost: bool) -> None:
     """`lost`: another life may follow. The recording is then written beside it; two writers of one record may not be,
     and a record that is older than the trip must not be believed."""
     kept = keeper.finish(WRITE_S)

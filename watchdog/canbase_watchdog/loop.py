@@ -12,10 +12,10 @@ import select
 import time
 from collections.abc import Callable
 
+from canbase_base.latch_file import LatchKeeper
 from canbase_watchdog import frames
 from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.input_ring import END, EXPIRE, FRAME, LEASE, SUSPEND, TICK, Input, InputRing
-from canbase_watchdog.latch_file import Keeper
 from canbase_watchdog.lease_socket import LeaseSocket
 from canbase_watchdog.relay import Relay
 from canbase_watchdog.report import Reporter
@@ -58,7 +58,7 @@ class Loop:
         bus: BusPort,
         leases: LeaseSocket,
         relay: Relay | None = None,
-        keeper: Keeper | None = None,
+        keeper: LatchKeeper | None = None,
         inputs: InputRing | None = None,
         recorder: TripRecorder | None = None,
     ) -> None:

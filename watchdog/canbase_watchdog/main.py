@@ -19,12 +19,13 @@ from types import FrameType
 
 from canbase_base import single_instance as sole
 from canbase_base.latch_folder import SUFFIX, latch_folder
+from canbase_base.output import never_wait
 from canbase_base.sd_notify import notify
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog.bus_port import BusError
 from canbase_watchdog.lease_socket import LeaseSocketError
 from canbase_watchdog.life import RecordError, live
-from canbase_watchdog.log import Lines, formatter, never_wait
+from canbase_watchdog.log import Lines, formatter
 from canbase_watchdog.loop import BusDeadError
 from canbase_watchdog.relay import RelayError
 from canbase_watchdog.report import ALIVE_PERIOD_S

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from canbase_watchdog.latch import Mark, Past
+from canbase_base.latch_record import Defect, Found, Mark, Record
 
 
 class TripCause(enum.IntEnum):
@@ -50,19 +50,32 @@ class Verdict:
 FINE = Verdict()
 
 
-def before_the_start(past: Past) -> Verdict:
+def before_the_start(found: Found) -> Verdict:
     """Why it is tripped from its first moment; FINE where a readable record is clear."""
-    if not past.latched:
+    if not found.latched:
         return FINE
-    if past.problem:
-        detail = f"the record of its last trip cannot be used: {past.problem}"
+    if found.defect is not Defect.NONE:
+        detail = f"the record of its last trip cannot be used: {found.defect.value} ({found.detail})"
         return Verdict(TripCause.RECORD_UNUSABLE, 0, detail)
-    entry = past.entry
-    if entry.mark is Mark.LIVE:
+    record = found.record
+    if record.mark is Mark.LIVE:
         return Verdict(TripCause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply")
-    known = entry.cause in tuple(TripCause) and entry.cause != TripCause.NONE
-    cause = TripCause(entry.cause) if known else TripCause.RECORD_UNUSABLE
-    return Verdict(cause, entry.node_id, f"{BEFORE}{entry.detail.removeprefix(BEFORE)}")
+    number, node_id = record.code & 0xFF, record.code >> 8 & _NODE
+    known = number in tuple(TripCause) and number != TripCause.NONE
+    cause = TripCause(number) if known else TripCause.RECORD_UNUSABLE
+    return Verdict(cause, node_id, f"{BEFORE}{record.detail.removeprefix(BEFORE)}")
+
+
+def code_of(verdict: Verdict, *, opened: bool) -> int:
+    """The code of a trip in the record. `opened`: the relay opened in it for a drive that kept its power."""
+    return verdict.cause | verdict.node_id << 8 | (_OPENED if opened else 0)
+
+
+def has_opened(record: Record) -> bool:
+    """The relay opened in that trip."""
+    return bool(record.code & _OPENED)
 
 
 BEFORE = "since before the start: "
+_OPENED, _NODE = 0x8000, 0x7F
+"""In the code of a record, above the cause."""

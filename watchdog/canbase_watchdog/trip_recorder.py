@@ -14,11 +14,11 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from canbase_base.latch_record import Found
 from canbase_base.own_folder import replaced
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import input_ring
 from canbase_watchdog.input_ring import Cut, InputRing, Trip, TripWatch
-from canbase_watchdog.latch import Past
 from canbase_watchdog.watchdog import Watchdog
 
 WAITING = 4
@@ -43,7 +43,7 @@ def folder_of(config: WatchdogConfig, environment: Mapping[str, str], home: Path
 class TripRecorder(threading.Thread):
     """Has a file written for each trip of this life."""
 
-    def __init__(self, ring: InputRing, config: WatchdogConfig, past: Past | None, folder: Path) -> None:
+    def __init__(self, ring: InputRing, config: WatchdogConfig, past: Found | None, folder: Path) -> None:
         """`past`: what the watchdog was made with."""
         super().__init__(name="inputs", daemon=True)
         self._ring, self._config, self._past = ring, config, past

@@ -6,6 +6,7 @@ import enum
 import math
 from dataclasses import dataclass, replace
 
+from canbase_base.latch_record import Found, Mark, Record, WriteAhead
 from canbase_config.watchdog import STATE_PERIOD_S, WatchdogConfig
 from canbase_watchdog import frames, policy
 from canbase_watchdog.envelope import Envelope
@@ -13,7 +14,6 @@ from canbase_watchdog.frames import Frame
 from canbase_watchdog.guarding import GuardRequests
 from canbase_watchdog.hard_braking import HardBraking
 from canbase_watchdog.ladder import Step
-from canbase_watchdog.latch import Entry, Ledger, Mark, Past
 from canbase_watchdog.lease import LeaseBook, Refusal
 from canbase_watchdog.left_right import LeftRightWatch
 from canbase_watchdog.observer import Observer
@@ -21,7 +21,7 @@ from canbase_watchdog.power_and_motion import in_motion, is_off, near_power, vel
 from canbase_watchdog.ramp_to_zero import RampToZeroWatch
 from canbase_watchdog.setpoint_at_rest import SetpointAtRestWatch
 from canbase_watchdog.stopper import Stopper
-from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
+from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start, code_of, has_opened
 from canbase_watchdog.twist import TwistWatch
 from canbase_watchdog.view import BusView, View
 
@@ -75,7 +75,7 @@ class Watchdog:
     """
 
     def __init__(
-        self, config: WatchdogConfig, now_s: float, past: Past | None = None, *, loopback: bool = True
+        self, config: WatchdogConfig, now_s: float, past: Found | None = None, *, loopback: bool = True
     ) -> None:
         """`config.lease_uid` None: leases of any user count, so the caller puts in its own.
 
@@ -100,7 +100,7 @@ class Watchdog:
         self._expired = FINE
         """LEASE_LOST between `expire` and the next tick."""
         self._stoppers: list[Stopper] = []
-        self._opened = past is not None and past.entry.opened
+        self._opened = past is not None and has_opened(past.record)
         """The relay has opened for a drive that kept its power, in any life, and no reset was accepted since."""
         self._reset = (0, Answer.NONE)
         self._reset_at = -math.inf
@@ -108,7 +108,7 @@ class Watchdog:
         self._guard = GuardRequests(config, now_s)
         self._reported_status: Status | None = None
         self._longest_gap_s = 0.0
-        self._ledger = Ledger(past)
+        self._ledger = WriteAhead(past)
         self.trips = 0
         """Since the start."""
         before = before_the_start(past) if past is not None else FINE
@@ -140,11 +140,11 @@ class Watchdog:
         return next((axis.drive.joint for axis in self._view.axes if axis.unproven and not axis.enabled), "")
 
     @property
-    def record(self) -> Entry:
+    def record(self) -> Record:
         """What shall be on disk now."""
         return self._ledger.wanted
 
-    def on_record(self, written: Entry | None, problem: str) -> None:
+    def on_record(self, written: Record | None, problem: str) -> None:
         """The newest record on disk (None: none since the start), and what keeps the writer from writing."""
         self._ledger.on_written(written, problem)
 
@@ -297,7 +297,7 @@ class Watchdog:
         verdict = self._verdict
         if self._state is State.TRIPPED:
             self._opened = self._opened or any(stopper.ladder.defied for stopper in self._stoppers)
-            self._ledger.want(Mark.LATCHED, verdict.cause, verdict.node_id, verdict.detail, opened=self._opened)
+            self._ledger.want(Mark.LATCHED, code_of(verdict, opened=self._opened), detail=verdict.detail)
         elif self._are_off(now_s):
             self._ledger.want(Mark.CLEAR)
         elif self._ledger.wanted.mark is not Mark.CLEAR or any(near_power(axis) for axis in self._view.axes):

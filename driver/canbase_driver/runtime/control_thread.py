@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from canbase_base.latch_file import LatchKeeper
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
@@ -26,7 +27,6 @@ from canbase_driver.snapshot import DriverSnapshot
 from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.stop_history import StopRecord
-from canbase_runtime.latch_file import LatchKeeper
 
 OLD_S = 0.5
 """A request that lay in the inbox for longer is refused: this process stood still, and its caller may be gone."""

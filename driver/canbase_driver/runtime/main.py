@@ -20,6 +20,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_base.latch_file import LatchFile, LatchKeeper
+from canbase_base.output import never_wait
 from canbase_base.sd_notify import Service
 from canbase_base.single_instance import TakenError
 from canbase_config.robot import Robot
@@ -33,9 +35,7 @@ from canbase_driver.runtime.bus_port import BusError
 from canbase_driver.runtime.claim import Claim
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.supervision.lifecycle import Aim
-from canbase_runtime.latch_file import LatchFile, LatchKeeper
 from canbase_runtime.log_priority import Priority
-from canbase_runtime.output import never_wait
 from canbase_runtime.private_process import guard_keys
 from canbase_runtime.ros_end import end_ros
 

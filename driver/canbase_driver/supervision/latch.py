@@ -7,13 +7,13 @@ Each record carries how far an operator lets the driver go (`code`): what was sw
 
 from __future__ import annotations
 
+from canbase_base.latch_record import Defect, Found, Mark, Record, WriteAhead
 from canbase_driver.causes import DriverCause, Finding
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_driver.supervision.phases import Phase
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.state_machine import StateMachine
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.latch_record import Defect, Found, Mark, Record, WriteAhead
 
 NOT_YET = "the driver's record of stops is not on disk yet"
 _WITH_POWER = (DriverState.ENABLING, DriverState.ENABLED, DriverState.STOPPING)

@@ -6,12 +6,12 @@ import math
 
 import pytest
 
+from canbase_base.latch_record import Mark
 from canbase_driver.causes import DriverCause
 from canbase_driver.drives.release_test import RETURN_S
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.latch_record import Mark
 from canbase_sim.cia402.axis import Supply
 from support.chain_world import BOOTED_S, FORWARD, STEP_S, World, setpoints, world_of
 

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
+from canbase_base.latch_record import Mark
+from canbase_campaign.disk import StopDisk
 from canbase_driver.core import DriverCore
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.latch_record import Mark
-from canbase_watchdog import latch
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import State, Watchdog
 from support.chain_world import World
@@ -121,7 +121,7 @@ def test_an_orderly_end_leaves_nothing_latched() -> None:
     assert world.run(3.0, lambda: world.core.finished)
     world.run(0.3)
     assert not world.disk.found().latched
-    assert not world.watchdog_disk.past().latched
+    assert not world.watchdog_disk.found().latched
     world.reboot()
     world.enable()
 
@@ -150,7 +150,7 @@ def test_the_record_says_live_before_any_drive_has_power() -> None:
     world = keeping()
     world.run(3.0, lambda: any(world.powered))
     assert world.disk.found().record.mark is Mark.LIVE
-    assert world.watchdog_disk.past().entry.mark is latch.Mark.LIVE
+    assert world.watchdog_disk.found().record.mark is Mark.LIVE
 
 
 @pytest.mark.parametrize("disk", ["driver", "watchdog"])
@@ -184,9 +184,9 @@ def test_a_record_that_cannot_be_read_is_latched_until_a_reset() -> None:
     world = keeping()
     world.enable()
     world.disk.file.data = world.watchdog_disk.file.data = None
-    world.disk, world.watchdog_disk = type(world.disk)("driver", "another"), type(world.watchdog_disk)("another")
+    world.disk, world.watchdog_disk = StopDisk("driver", "another"), StopDisk("watchdog", "another")
     stolen = world.disk.file.data, world.watchdog_disk.file.data
-    world.disk, world.watchdog_disk = type(world.disk)("driver"), type(world.watchdog_disk)()
+    world.disk, world.watchdog_disk = StopDisk("driver"), StopDisk("watchdog")
     world.disk.file.data, world.watchdog_disk.file.data = stolen
     world.reboot()
     world.run(2.0)

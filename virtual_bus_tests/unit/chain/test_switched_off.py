@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
+from canbase_base.latch_record import Defect, Found, Mark, Record
 from canbase_driver.supervision.latch import allowed_before_the_start
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.latch_record import Defect, Found, Mark, Record
 from support.chain_world import FORWARD, World
 
 AWAY_S = 0.5

@@ -12,11 +12,11 @@ from typing import NoReturn
 
 import pytest
 
+from canbase_base.latch_file import LatchFile
 from canbase_base.latch_folder import PARTS, SUFFIX
 from canbase_deploy.actions import FirstRecords
 from canbase_deploy.execute import Executor, as_user, first_records
 from canbase_deploy.plan import install_plan
-from canbase_runtime.latch_file import LatchFile
 from support.install_plans import request
 
 TRIES = 200

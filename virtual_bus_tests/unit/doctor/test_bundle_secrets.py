@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from canbase_base.latch_file import LatchFile, create_first
+from canbase_base.latch_record import Mark, Record
 from canbase_config.load import load_robot, sample
 from canbase_doctor.bundle_contents import Command, commands
 from canbase_doctor.bundle_filter import (
@@ -26,8 +28,6 @@ from canbase_doctor.bundle_filter import (
 from canbase_doctor.bundle_frames import Frames, asc_line
 from canbase_doctor.bundle_words import LEFT_OUT, Words, own_words
 from canbase_doctor.support_bundle import collect
-from canbase_runtime.latch_file import LatchFile, create_first
-from canbase_runtime.latch_record import Mark, Record
 
 SECRETS = {
     "a comment of robot.yaml": "hunter2",

@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from canbase_base.latch_file import LatchFile, create_first
 from canbase_base.latch_folder import machine
+from canbase_base.latch_record import Mark, Record
 from canbase_cli.main import app
 from canbase_config.load import load_robot, sample
 from canbase_doctor import support_bundle as module
@@ -21,8 +23,6 @@ from canbase_doctor.bounded_run import run
 from canbase_doctor.bundle_contents import Command
 from canbase_doctor.careful_read import RefusedError, modified, names, read_end
 from canbase_doctor.support_bundle import Bundle, collect
-from canbase_runtime.latch_file import LatchFile, create_first
-from canbase_runtime.latch_record import Mark, Record
 
 ROBOT = load_robot(sample("bench")).robot
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from canbase_base.latch_record import Mark
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.fault_reset import RequestOutcome
 from canbase_driver.supervision.lifecycle import Aim
 from canbase_runtime.driver_state import DriverState
-from canbase_runtime.latch_record import Mark
 from canbase_watchdog.watchdog import State as WatchdogState
 from support.chain_world import FORWARD, World
 

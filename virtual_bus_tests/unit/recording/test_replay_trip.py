@@ -238,7 +238,7 @@ BAD = "line 9: no input of a watchdog"
     [
         (lambda lines: [], "line 1: no JSON"),
         (lambda lines: ["{}"], "line 1: it is no file of the inputs of a watchdog's trip"),
-        (_head('"format": 1', '"format": 7'), "format '7', expected 1"),
+        (_head('"format": 2', '"format": 7'), "format '7', expected 2"),
         (_head('"track_m"', '"wide_m"'), "line 1: a value is not"),
         (_head('"trip"', '"stop"'), "line 1: the key 'trip' is missing"),
         (_changed(9, '["frame", 1.0, 385, "27'), "line 9: no JSON"),

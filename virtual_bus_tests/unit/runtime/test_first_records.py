@@ -8,12 +8,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from canbase_base.latch_file import LatchFile
 from canbase_base.latch_folder import PARTS, latch_folder
+from canbase_base.latch_record import Defect
 from canbase_cli.main import app
 from canbase_cli.services import clear_first_records
 from canbase_config.load import load_robot, sample
-from canbase_runtime.latch_file import LatchFile
-from canbase_runtime.latch_record import Defect
 
 
 def started(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, *, simulated: bool) -> set[Defect]:

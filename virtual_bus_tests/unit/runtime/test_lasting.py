@@ -1,4 +1,4 @@
-"""Which folders a reboot may empty, by tables of mounts as real computers have them; alike in driver and watchdog."""
+"""Which folders a reboot may empty, by tables of mounts as real computers have them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from pathlib import Path
 import pytest
 
 from canbase_base.lasting import UNKNOWN, forgets
+from canbase_base.latch_file import LatchFile
 from canbase_base.latch_folder import forgetful
+from canbase_base.latch_record import Defect, Record
 from canbase_config.load import load_robot, sample
-from canbase_runtime.latch_file import LatchFile
-from canbase_runtime.latch_record import Defect, Record
-from canbase_watchdog import latch_file as of_watchdog
-from canbase_watchdog.latch import Entry
 from support.watchdog_story import config
 
 DISK = """\
@@ -77,7 +75,7 @@ def test_what_is_in_memory_or_a_layer_over_an_image_is_forgotten(mounts: str, fo
         ("ext4", "/dev/mapper/ramses", True),
     ],
 )
-def test_what_is_not_known_to_last_counts_as_forgotten_in_driver_and_watchdog_alike(
+def test_what_is_not_known_to_last_counts_as_forgotten(
     kind: str, device: str, lasts: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mounts = f"28 1 254:1 / / rw,relatime shared:1 - {kind} {device} rw\n"
@@ -116,28 +114,12 @@ def test_what_an_operator_switched_off_stays_off_there_too(tmp_path: Path, monke
     assert (found.defect, found.record.code) == (Defect.NONE, 1)
 
 
-@pytest.mark.parametrize(("mounts", "latched"), [(SUBVOLUME, False), (INITRAMFS, True), ("", True)])
-def test_the_watchdog_takes_it_for_a_trip(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mounts: str, latched: bool
-) -> None:
-    mounted(monkeypatch, mounts)
-    path = tmp_path / "watchdog.latch"
-    keeper = of_watchdog.Keeper(path, "carl")
-    keeper.start()
-    keeper.want(Entry())
-    assert keeper.finish(5.0)
-    again = of_watchdog.Keeper(path, "carl", must_last=True)
-    assert again.past.latched is latched
-    assert (str(tmp_path) in again.past.problem) is latched
-    assert not of_watchdog.Keeper(path, "carl").past.latched
-
-
 @pytest.mark.parametrize(
     ("file", "made"),
     [
         ("driver/canbase_driver/runtime/main.py", "LatchFile"),
         ("velocity_mux/canbase_velocity/main.py", "LatchFile"),
-        ("watchdog/canbase_watchdog/life.py", "Keeper"),
+        ("watchdog/canbase_watchdog/life.py", "LatchFile"),
     ],
 )
 def test_in_each_process_of_a_robot_with_a_wire_the_record_must_last(file: str, made: str) -> None:

@@ -1,4 +1,4 @@
-"""The files of latch records: that of driver and filter, and the watchdog's own."""
+"""The files of latch records, and the thread that writes them."""
 
 from __future__ import annotations
 
@@ -12,39 +12,26 @@ from typing import Any
 
 import pytest
 
+from canbase_base import latch_file
+from canbase_base.latch_file import LatchFile, LatchKeeper, create_first
 from canbase_base.latch_folder import latch_folder
-from canbase_runtime.latch_file import LatchFile, LatchKeeper, create_first
-from canbase_runtime.latch_record import SIZE, Mark, Record
-from canbase_watchdog import latch, latch_file
+from canbase_base.latch_record import SIZE, Mark, Record
 
 PARTS = ("driver", "watchdog")
 
 
 class Kept:
-    """One of the two keepers, seen alike."""
+    """The record of one part, and who keeps it."""
 
     def __init__(self, part: str, folder: Path, robot: str = "carl") -> None:
-        self.part, self.path = part, folder / f"{part}.latch"
-        self.keeper: Any = (
-            LatchKeeper(LatchFile(folder, part, robot)) if part == "driver" else latch_file.Keeper(self.path, robot)
-        )
-
-    @property
-    def latched(self) -> bool:
-        return bool((self.keeper.found if self.part == "driver" else self.keeper.past).latched)
-
-    @property
-    def mark(self) -> int:
-        return int((self.keeper.found.record if self.part == "driver" else self.keeper.past.entry).mark)
+        file = LatchFile(folder, part, robot)
+        self.path, self.keeper = file.path, LatchKeeper(file)
+        self.latched, self.mark = self.keeper.found.latched, self.keeper.found.record.mark
 
     def write(self, mark: int) -> bool:
         """What it wants is on disk within a second, or it has said why not."""
         self.keeper.problem = ""
-        wanted = (
-            Record(Mark(mark), number=mark + 1)
-            if self.part == "driver"
-            else latch.Entry(latch.Mark(mark), number=mark + 1)
-        )
+        wanted = Record(Mark(mark), number=mark + 1)
         if not self.keeper.is_alive():
             self.keeper.start()
         self.keeper.want(wanted)
@@ -55,8 +42,7 @@ class Kept:
         return self.keeper.written is wanted
 
     def finish(self) -> None:
-        self.keeper.finish(1.0)
-        assert self.keeper.failure is None
+        assert self.keeper.finish(1.0)
         assert not self.keeper.is_alive()
 
 
@@ -208,8 +194,7 @@ def test_a_write_that_fails_is_tried_again(folder: Path, part: str, monkeypatch:
             raise left.pop()
         return really(*arguments)
 
-    module = "canbase_runtime.latch_file" if part == "driver" else "canbase_watchdog.latch_file"
-    monkeypatch.setattr(f"{module}.RETRY_S", 0.01)
+    monkeypatch.setattr(latch_file, "RETRY_S", 0.01)
     monkeypatch.setattr(os, "pwrite", pwrite)
     kept = Kept(part, folder)
     kept.write(2)
@@ -234,7 +219,7 @@ def test_where_the_records_are(environment: dict[str, str], folder: str) -> None
     assert latch_folder(environment, Path("/home/u"), "carl") == Path(folder)
 
 
-def test_the_watchdogs_thread_has_a_small_stack_as_its_memory_is_locked(
+def test_the_thread_has_a_small_stack_as_the_watchdogs_memory_is_locked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """mlockall makes all of a stack resident. Threads that start later have theirs as before."""
@@ -245,7 +230,7 @@ def test_the_watchdogs_thread_has_a_small_stack_as_its_memory_is_locked(
         begin(thread)
 
     monkeypatch.setattr(threading.Thread, "start", start)
-    keeper = latch_file.Keeper(tmp_path / "watchdog.latch", "carl")
+    keeper = LatchKeeper(LatchFile(tmp_path, "watchdog", "carl"))
     keeper.start()
     assert sizes == [512 * 1024]
     assert threading.stack_size() == usual

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canbase_runtime import latch_record
-from canbase_runtime.latch_record import SLOT, Defect, Found, Mark, Record, WriteAhead, owner_of, place_of, read, slot
-from canbase_watchdog import latch
+from canbase_base import latch_record
+from canbase_base.latch_record import SLOT, Defect, Found, Mark, Record, WriteAhead, owner_of, place_of, read, slot
 
 OWNER = owner_of("driver", "carl", "machine")
 LATCHED = Record(Mark.LATCHED, 7, "drive fault", "left_wheel: node 1 is in fault")
@@ -81,7 +81,6 @@ def test_a_torn_write_counts_as_latched(new: Record, written: int) -> None:
 def test_a_record_of_another_robot_computer_or_part(owner: bytes, defect: Defect) -> None:
     found = read(file_after(), owner)
     assert (found.defect, found.latched) == (defect, defect is not Defect.NONE)
-    assert latch.decode(file_after(), owner).latched == found.latched
 
 
 def test_a_version_from_the_future(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,20 +90,17 @@ def test_a_version_from_the_future(monkeypatch: pytest.MonkeyPatch) -> None:
     found = read(future, OWNER)
     assert found.defect is Defect.VERSION
     assert "version 2" in found.sentence
-    assert latch.decode(future, OWNER).latched
 
 
 def test_slots_that_do_not_belong_together() -> None:
     for first, second in ((1, 1), (2, 1), (1, 4), (3, 6), (0, 1)):
         data = slot(Record(), first, OWNER) + slot(Record(), second, OWNER)
         assert read(data, OWNER).latched, (first, second)
-        assert latch.decode(data, OWNER).latched, (first, second)
 
 
 def test_an_unknown_mark() -> None:
     data = slot(replace(Record(), mark=9), 1, OWNER) + slot(Record(), 2, OWNER)  # type: ignore[arg-type]
     assert read(data, OWNER).defect is Defect.GARBAGE
-    assert latch.decode(data, OWNER).latched
 
 
 def test_long_texts_are_cut_in_whole_characters() -> None:
@@ -116,37 +112,6 @@ def test_long_texts_are_cut_in_whole_characters() -> None:
 @given(data=st.binary(max_size=3 * SLOT))
 def test_garbage_never_raises_and_is_latched(data: bytes) -> None:
     assert read(data, OWNER).latched
-    assert latch.decode(data, OWNER).latched
-
-
-@given(
-    mark=st.sampled_from(Mark), cause=st.integers(0, 255), node=st.integers(0, 127), detail=st.text(max_size=600),
-    sequence=st.integers(1, 2**64 - 2), opened=st.booleans(),
-)  # fmt: skip
-def test_the_watchdogs_layout_is_the_same(
-    mark: Mark, cause: int, node: int, detail: str, sequence: int, opened: bool
-) -> None:
-    owner = owner_of("watchdog", "carl", "machine")
-    assert latch.owner("carl", "machine") == owner
-    entry = latch.Entry(latch.Mark(mark), cause, node, detail, opened=opened)
-    record = Record(mark, cause | node << 8 | opened << 15, "", detail)
-    assert latch.page(entry, sequence, owner) == slot(record, sequence, owner)
-    pages = sorted((sequence, sequence + 1), key=lambda each: each % 2 == 0)
-    data = b"".join(latch.page(entry, each, owner) for each in pages)
-    past, found = latch.decode(data, owner), read(data, owner)
-    assert (int(past.entry.mark), past.entry.cause, past.entry.node_id) == (int(mark), cause, node)
-    assert past.entry.opened is opened
-    assert (past.entry.detail, past.sequence) == (found.record.detail, found.sequence)
-
-
-def test_every_changed_byte_is_a_trip_for_the_watchdog() -> None:
-    owner = latch.owner("carl", "machine")
-    clear = latch.page(latch.Entry(), 3, owner) + latch.page(latch.Entry(), 2, owner)
-    assert not latch.decode(clear, owner).latched
-    for at in range(len(clear)):
-        data = bytearray(clear)
-        data[at] ^= 0xFF
-        assert latch.decode(bytes(data), owner).latched, at
 
 
 def test_on_disk_is_said_of_this_wish_alone() -> None:
@@ -164,29 +129,30 @@ def test_on_disk_is_said_of_this_wish_alone() -> None:
     assert not ledger.is_on_disk
 
 
-def test_the_watchdogs_ledger_likewise() -> None:
-    ledger = latch.Ledger(latch.Past())
-    ledger.want(latch.Mark.LIVE)
+@pytest.mark.parametrize(
+    "change", [{"mark": Mark.LIVE}, {"code": 4}, {"cause": "lease lost"}, {"detail": "no lease for 0.3 s"}], ids=str
+)
+def test_any_other_content_is_a_new_wish_and_the_same_is_none(change: dict[str, Any]) -> None:
+    trip: dict[str, Any] = {"mark": Mark.LATCHED, "code": 3, "cause": "driver silent", "detail": "no heartbeat"}
+    ledger = WriteAhead(Found())
+    ledger.want(**trip)
     first = ledger.wanted
     ledger.on_written(first, "")
+    ledger.want(**trip)
+    assert ledger.wanted is first
     assert ledger.is_on_disk
-    ledger.want(latch.Mark.CLEAR)
-    ledger.want(latch.Mark.LIVE)
+    ledger.want(**trip | change)
+    assert ledger.wanted == replace(first, number=2, **change)
     assert not ledger.is_on_disk
-    ledger.on_written(None, "full")
-    assert (ledger.is_on_disk, ledger.problem) == (False, "full")
 
 
 @pytest.mark.parametrize("defect", [defect for defect in Defect if defect is not Defect.NONE])
 def test_a_record_that_cannot_be_used_is_never_on_disk(defect: Defect) -> None:
     ledger = WriteAhead(Found(defect=defect))
     assert not ledger.is_on_disk
-    assert not latch.Ledger(latch.Past(problem=defect.value)).is_on_disk
 
 
 def test_without_a_keeper_every_wish_is_on_disk() -> None:
-    ledger, other = WriteAhead(None), latch.Ledger(None)
+    ledger = WriteAhead(None)
     ledger.want(Mark.LIVE)
-    other.want(latch.Mark.LIVE)
     assert ledger.is_on_disk
-    assert other.is_on_disk

@@ -13,11 +13,10 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from canbase_base import own_folder
+from canbase_base.latch_file import LatchFile, LatchKeeper, create_first
+from canbase_base.latch_record import Defect, Record
 from canbase_deploy.actions import Link, Remove, WriteFile
 from canbase_deploy.execute import ExecuteError, Executor, first_records
-from canbase_runtime.latch_file import LatchFile, create_first
-from canbase_runtime.latch_record import Defect, Record
-from canbase_watchdog import latch, latch_file
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 
 STRANGER = 12345
@@ -149,11 +148,10 @@ def test_nothing_is_done_as_root_in_the_folder_of_another_user(taken: Path, tmp_
     assert file.open().defect is Defect.ACCESS
     with pytest.raises(OSError, match=f"belongs to user {STRANGER}"):
         file.write(Record())
-    keeper = latch_file.Keeper(taken / "watchdog.latch", "carl")
-    assert keeper.past.latched
-    assert f"belongs to user {STRANGER}" in keeper.past.problem
+    keeper = LatchKeeper(LatchFile(taken, "watchdog", "carl"))
+    assert f"belongs to user {STRANGER}" in keeper.found.detail
     keeper.start()
-    keeper.want(latch.Entry())
+    keeper.want(Record())
     assert not keeper.finish(5.0)
     with pytest.raises(OSError, match=f"belongs to user {STRANGER}"):
         create_first(taken / "state" / "carl", "carl")
@@ -319,7 +317,7 @@ OTHERWISE = {
     "canbase_evidence/new_folder.py": "files of that folder",
     "canbase_qualification/carry_out.py": "in a temporary folder",
     "canbase_recording/stop_file.py": "in a temporary folder",
-    "canbase_runtime/latch_file.py": "a new folder gets its name whole",
+    "canbase_base/latch_file.py": "a new folder gets its name whole",
 }
 """Modules that write, or give a name, without `replaced`."""
 

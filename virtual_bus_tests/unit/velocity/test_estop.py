@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from canbase_runtime.latch_record import Found, Mark, Record
+from canbase_base.latch_record import Found, Mark, Record
 from canbase_velocity.estop import TRANSITIONS, Estop, EstopEvent, EstopState
 
 FREE, HELD, AWAITS_RESET, AWAITS_ZERO = EstopState

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from canbase_base.latch_record import Defect, Found, Mark
 from canbase_campaign.disk import FULL, StopDisk
-from canbase_runtime.latch_record import Defect, Found, Mark
 from canbase_runtime.stop_cause import StopCause
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.estop import Estop, EstopEvent, EstopState

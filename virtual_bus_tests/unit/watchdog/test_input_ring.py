@@ -7,6 +7,7 @@ import math
 
 import pytest
 
+from canbase_base.latch_record import Defect, Found, Mark, Record
 from canbase_watchdog.input_ring import (
     FRAME,
     LATEST_S,
@@ -20,7 +21,6 @@ from canbase_watchdog.input_ring import (
     head,
     lines,
 )
-from canbase_watchdog.latch import Entry, Mark, Past
 from canbase_watchdog.trip_cause import TripCause
 from canbase_watchdog.watchdog import Watchdog
 from support.watchdog_story import FakeDrive, Story, config
@@ -52,10 +52,14 @@ def test_a_flooded_bus_does_not_make_it_longer() -> None:
 
 
 def test_each_line_is_json_and_infinity_is_null() -> None:
-    first = head(config(), Past(Entry(Mark.CLEAR)), Trip(1.0, 1, "lease_lost", 0, "no lease"), 1.79e9)
+    first = head(config(), Found(Record(Mark.CLEAR)), Trip(1.0, 1, "lease_lost", 0, "no lease"), 1.79e9)
     told = [json.loads(line) for line in lines(first, [(TICK, 1.0, math.inf, 3), (FRAME, 1.0, 0x181, b"\x27\x02")])]
     assert told[1:] == [["tick", 1.0, None, 3], ["frame", 1.0, 0x181, "2702"]]
-    assert (told[0]["part"], told[0]["trip"]["name"], told[0]["past"]["entry"]["mark"]) == ("watchdog", "lease_lost", 0)
+    assert (told[0]["part"], told[0]["trip"]["name"], told[0]["past"]["record"]["mark"]) == (
+        "watchdog",
+        "lease_lost",
+        0,
+    )
 
 
 class Watched:
@@ -110,12 +114,12 @@ def test_a_drive_that_does_not_stop_does_not_hold_the_file_up() -> None:
 @pytest.mark.parametrize(
     ("past", "is_new"),
     [
-        (Past(Entry(Mark.LATCHED, int(TripCause.LEASE_LOST), 0, "no lease")), False),
-        (Past(Entry(Mark.LIVE)), True),
-        (Past(problem="it is damaged"), True),
+        (Found(Record(Mark.LATCHED, int(TripCause.LEASE_LOST), "", "no lease")), False),
+        (Found(Record(Mark.LIVE)), True),
+        (Found(defect=Defect.GARBAGE), True),
     ],
 )
-def test_a_trip_that_a_restart_found_on_disk_is_not_recorded_again(past: Past, is_new: bool) -> None:
+def test_a_trip_that_a_restart_found_on_disk_is_not_recorded_again(past: Found, is_new: bool) -> None:
     """A power cut, or a record that cannot be read, is a stop of its own."""
     ring = InputRing(10.0, 0.0)
     watch = TripWatch(ring, past)

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from canbase_base.latch_record import Defect, Found, Mark, Record, read, whole
 from canbase_watchdog import frames
-from canbase_watchdog.latch import Entry, Ledger, Mark, Past, decode, page
-from canbase_watchdog.trip_cause import FINE, TripCause, before_the_start
+from canbase_watchdog.trip_cause import FINE, TripCause, Verdict, before_the_start, code_of, has_opened
 from canbase_watchdog.watchdog import Answer, State, Watchdog
 from support.watchdog_story import ENABLED, FakeDrive, Story
 from support.watchdog_story_looks import driving, until_tripped
@@ -17,7 +17,7 @@ from support.watchdog_story_looks import driving, until_tripped
 STATE = 0x1FE
 
 
-def resumed(past: Past, *drives: FakeDrive) -> Story:
+def resumed(past: Found, *drives: FakeDrive) -> Story:
     """A watchdog that starts with this record, among drives that are off."""
     story = Story(*drives)
     story.watchdog = Watchdog(story.config, 0.0, past)
@@ -35,19 +35,23 @@ def keep(story: Story) -> None:
 @pytest.mark.parametrize(
     ("past", "cause", "detail"),
     [
-        (Past(Entry(Mark.LIVE)), TripCause.POWER_AT_END, "it ended while a drive had power"),
-        (Past(Entry(Mark.LATCHED, 6, 2, "too fast")), TripCause.OVERSPEED, "since before the start: too fast"),
+        (Found(Record(Mark.LIVE)), TripCause.POWER_AT_END, "it ended while a drive had power"),
+        (Found(Record(Mark.LATCHED, 0x0206, "", "too fast")), TripCause.OVERSPEED, "since before the start: too fast"),
         (
-            Past(Entry(Mark.LATCHED, 6, 2, "since before the start: too fast")),
+            Found(Record(Mark.LATCHED, 0x0206, "", "since before the start: too fast")),
             TripCause.OVERSPEED,
             "since before the start: too fast",
         ),
-        (Past(Entry(Mark.LATCHED, 99, 0, "?")), TripCause.RECORD_UNUSABLE, "since before the start: ?"),
-        (Past(Entry(Mark.LATCHED, 0)), TripCause.RECORD_UNUSABLE, "since before the start: "),
-        (Past(problem="/x: damaged"), TripCause.RECORD_UNUSABLE, "cannot be used: /x: damaged"),
+        (Found(Record(Mark.LATCHED, 0x0063, "", "?")), TripCause.RECORD_UNUSABLE, "since before the start: ?"),
+        (Found(Record(Mark.LATCHED)), TripCause.RECORD_UNUSABLE, "since before the start: "),
+        (
+            Found(defect=Defect.GARBAGE, detail="/x"),
+            TripCause.RECORD_UNUSABLE,
+            "cannot be used: the record of stops is damaged (/x)",
+        ),
     ],
 )
-def test_it_starts_tripped(past: Past, cause: TripCause, detail: str) -> None:
+def test_it_starts_tripped(past: Found, cause: TripCause, detail: str) -> None:
     story = resumed(past)
     status = story.watchdog.status
     assert (status.state, status.verdict.cause) == (State.TRIPPED, cause)
@@ -62,7 +66,7 @@ def test_it_starts_tripped(past: Past, cause: TripCause, detail: str) -> None:
 
 
 def test_it_starts_watching_with_a_clear_record() -> None:
-    story = resumed(Past())
+    story = resumed(Found())
     story.run(0.5)
     assert story.watchdog.status.state is State.WATCHING
     assert mark_of(story) is Mark.CLEAR
@@ -70,14 +74,14 @@ def test_it_starts_watching_with_a_clear_record() -> None:
 
 # start, tripped ── drives booted and off ── no frame to them
 def test_drives_that_are_off_are_left_alone() -> None:
-    story = resumed(Past(Entry(Mark.LIVE)))
+    story = resumed(Found(Record(Mark.LIVE)))
     story.run(2.0)
     assert {frame.cob_id for _, frame in story.sent} <= {0x1FE, 0x2FE, 0x77E}
 
 
 def test_a_drive_that_has_power_is_stopped() -> None:
     drive = FakeDrive(1)
-    story = resumed(Past(Entry(Mark.LIVE)), drive, FakeDrive(2))
+    story = resumed(Found(Record(Mark.LIVE)), drive, FakeDrive(2))
     story.obedient = False
     story.drive_at(300, 0.3)
     story.word, story.speed = 0x06, 0
@@ -151,8 +155,8 @@ def abandoned(drive: FakeDrive, **changes: Any) -> Story:
 
     `changes`: of its configuration.
     """
-    story = resumed(Past(problem="/x: damaged"), drive, FakeDrive(2, mute=True))
-    story.watchdog = Watchdog(replace(story.config, **changes), 0.0, Past(problem="/x: damaged"))
+    story = resumed(Found(defect=Defect.GARBAGE, detail="/x"), drive, FakeDrive(2, mute=True))
+    story.watchdog = Watchdog(replace(story.config, **changes), 0.0, Found(defect=Defect.GARBAGE, detail="/x"))
     story.driver = story.heartbeat = story.sync = story.filter = False
     drive.words[0], drive.target[0], drive.speed[0] = ENABLED, 300, 300.0
     return story
@@ -160,7 +164,7 @@ def abandoned(drive: FakeDrive, **changes: Any) -> Story:
 
 def test_no_reset_before_the_drives_were_seen_to_stand() -> None:
     drive = FakeDrive(1)
-    story = resumed(Past(Entry(Mark.LIVE)), drive, FakeDrive(2))
+    story = resumed(Found(Record(Mark.LIVE)), drive, FakeDrive(2))
     story.sync = False  # heartbeats, and no feedback
     story.run(0.2)
     assert story.reset(1) == Answer.CAUSE_STANDS
@@ -170,7 +174,7 @@ def test_no_reset_before_the_drives_were_seen_to_stand() -> None:
 
 
 def test_a_reset_needs_no_drive_that_was_never_there() -> None:
-    story = resumed(Past(Entry(Mark.LIVE)))
+    story = resumed(Found(Record(Mark.LIVE)))
     for drive in story.drives:
         drive.mute = True
     story.word = 0x00
@@ -182,7 +186,7 @@ def test_a_reset_needs_no_drive_that_was_never_there() -> None:
 
 # switched on ── LIVE wanted ── on disk ── bit 7 ── enabled
 def test_the_bit_is_set_when_live_is_on_disk() -> None:
-    story = resumed(Past())
+    story = resumed(Found())
     story.run(0.4)
     for drive in story.drives:
         drive.words[0] = 0x0233
@@ -202,7 +206,7 @@ def test_the_bit_is_set_when_live_is_on_disk() -> None:
 
 
 def test_it_stays_live_until_the_power_was_seen_to_be_off() -> None:
-    story = resumed(Past())
+    story = resumed(Found())
     for drive in story.drives:
         drive.words[0] = 0x0233
     story.run(0.4)
@@ -232,7 +236,7 @@ def test_a_trip_is_written_with_its_cause_and_cleared_by_the_reset_alone() -> No
     story.filter = False
     until_tripped(story)
     record = story.watchdog.record
-    assert (record.mark, record.cause) == (Mark.LATCHED, TripCause.LEASE_LOST)
+    assert (record.mark, record.code) == (Mark.LATCHED, TripCause.LEASE_LOST)
     story.run(2.0)
     assert story.watchdog.record == record
     story.filter = True
@@ -245,11 +249,11 @@ def test_a_trip_is_written_with_its_cause_and_cleared_by_the_reset_alone() -> No
 def test_a_trip_at_the_end_is_written() -> None:
     story = driving()
     story.watchdog.end(story.t)
-    assert (story.watchdog.record.mark, story.watchdog.record.cause) == (Mark.LATCHED, TripCause.ENDED)
+    assert (story.watchdog.record.mark, story.watchdog.record.code) == (Mark.LATCHED, TripCause.ENDED)
 
 
 def test_a_readable_clear_record_is_no_cause() -> None:
-    assert before_the_start(Past()) is FINE
+    assert before_the_start(Found()) is FINE
 
 
 # 0 s a wheel does not brake ── 0.3 s power off, relay open ── killed ── its next life: the relay stays open
@@ -258,20 +262,19 @@ def test_a_relay_that_a_runaway_wheel_has_opened_stays_open_until_the_reset_over
     story = driving(drive)
     drive.brakes = story.filter = story.obedient = False
     until_tripped(story)
-    assert not story.watchdog.record.opened
+    assert not has_opened(story.watchdog.record)
     story.run(0.5)
     assert not story.watchdog.keeps_relay
     owner = b"carl".ljust(32)
-    data = b"".join(page(story.watchdog.record, sequence, owner) for sequence in (1, 2))
-    next_life = resumed(decode(data, owner))
+    next_life = resumed(read(whole(story.watchdog.record, owner), owner))
     assert not next_life.watchdog.keeps_relay
     next_life.run(2.0)
     assert not next_life.watchdog.keeps_relay
-    assert next_life.watchdog.record.opened, "a third life must know it too"
+    assert has_opened(next_life.watchdog.record), "a third life must know it too"
     assert next_life.reset(1) == Answer.DONE
     next_life.run(0.1)
     assert next_life.watchdog.keeps_relay
-    assert not next_life.watchdog.record.opened
+    assert not has_opened(next_life.watchdog.record)
 
 
 def test_a_trip_that_did_not_open_the_relay_leaves_it_closed_over_a_restart() -> None:
@@ -281,74 +284,15 @@ def test_a_trip_that_did_not_open_the_relay_leaves_it_closed_over_a_restart() ->
     until_tripped(story)
     story.run(2.0)
     assert story.watchdog.keeps_relay
-    assert resumed(Past(story.watchdog.record)).watchdog.keeps_relay
+    assert resumed(Found(story.watchdog.record)).watchdog.keeps_relay
 
 
 # a drive is silent, another one does not brake, and the relay feeds both ── restart ── neither answers ── reset: done
 def test_a_drive_that_an_open_relay_leaves_without_supply_keeps_no_reset_away() -> None:
-    silent = Entry(Mark.LATCHED, int(TripCause.DRIVE_SILENT), 1, "no feedback", opened=True)
-    for past, answer in ((Past(silent), Answer.DONE), (Past(replace(silent, opened=False)), Answer.CAUSE_STANDS)):
-        story = resumed(past, FakeDrive(1, mute=True), FakeDrive(2, mute=True))
+    for opened, answer in ((True, Answer.DONE), (False, Answer.CAUSE_STANDS)):
+        code = code_of(Verdict(TripCause.DRIVE_SILENT, 1), opened=opened)
+        story = resumed(
+            Found(Record(Mark.LATCHED, code, "", "no feedback")), FakeDrive(1, mute=True), FakeDrive(2, mute=True)
+        )
         story.run(1.0)
         assert story.reset(1) == answer
-
-
-# What is wanted on disk, and what is there
-
-
-def test_what_is_wanted_is_on_disk_when_it_was_written() -> None:
-    ledger = Ledger(Past())
-    assert ledger.is_on_disk
-    ledger.want(Mark.LIVE)
-    assert ledger.wanted == Entry(Mark.LIVE, 0, 0, "", 1, opened=False)
-    assert not ledger.is_on_disk
-    ledger.on_written(None, "the disk is full")
-    assert (ledger.is_on_disk, ledger.problem) == (False, "the disk is full")
-    ledger.on_written(ledger.wanted, "")
-    assert (ledger.is_on_disk, ledger.problem) == (True, "")
-
-
-TRIP: dict[str, Any] = {"mark": Mark.LATCHED, "cause": 3, "node_id": 2, "detail": "driver silent", "opened": False}
-
-
-@pytest.mark.parametrize(
-    "change", [{"mark": Mark.LIVE}, {"cause": 4}, {"node_id": 1}, {"detail": "lease lost"}, {"opened": True}]
-)
-def test_any_other_content_is_a_new_request_and_the_same_is_none(change: dict[str, Any]) -> None:
-    ledger = Ledger(Past())
-    ledger.want(**TRIP)
-    first = ledger.wanted
-    ledger.on_written(first, "")
-    ledger.want(**TRIP)
-    assert ledger.wanted is first
-    assert ledger.is_on_disk
-    ledger.want(**TRIP | change)
-    assert ledger.wanted == replace(first, number=2, **change)
-    assert not ledger.is_on_disk
-
-
-# LIVE, written ── CLEAR ── LIVE: the disk may have CLEAR from the second, so the first LIVE is no evidence of the third
-def test_the_same_content_that_was_written_earlier_is_not_on_disk() -> None:
-    ledger = Ledger(Past())
-    ledger.want(Mark.LIVE)
-    first = ledger.wanted
-    ledger.want(Mark.CLEAR)
-    ledger.want(Mark.LIVE)
-    assert ledger.wanted.number == 3
-    ledger.on_written(first, "")
-    assert not ledger.is_on_disk
-
-
-def test_without_a_record_what_is_wanted_counts_as_written() -> None:
-    ledger = Ledger(None)
-    assert ledger.is_on_disk
-    ledger.want(Mark.LIVE)
-    assert ledger.is_on_disk
-
-
-def test_a_record_that_cannot_be_used_is_not_on_disk() -> None:
-    ledger = Ledger(Past(problem="it is damaged"))
-    assert not ledger.is_on_disk
-    ledger.want(Mark.LATCHED, 1)
-    ledger.on_written(ledger.wanted, "")
-    assert ledger.is_on_disk

@@ -8,13 +8,21 @@ from typing import Any
 
 import pytest
 
+from canbase_base.latch_record import Defect, Found, Mark, Record
 from canbase_watchdog.envelope import Bounds
 from canbase_watchdog.frames import DriveState
-from canbase_watchdog.latch import Entry, Mark, Past
 from canbase_watchdog.lease import Lease
 from canbase_watchdog.policy import CHECKS, Check, decide, next_expiry, stands
 from canbase_watchdog.power_and_motion import commanded, in_motion, is_off, moving, near_power, velocity_ordered
-from canbase_watchdog.trip_cause import FINE, SENSOR_CAUSES, TripCause, Verdict, before_the_start
+from canbase_watchdog.trip_cause import (
+    FINE,
+    SENSOR_CAUSES,
+    TripCause,
+    Verdict,
+    before_the_start,
+    code_of,
+    has_opened,
+)
 from canbase_watchdog.view import NEVER, Node, View
 from support.watchdog_views import AT_REST, CONFIG, LEFT, NOW, OFF, RIGHT, WELL, cause, of, well
 
@@ -300,35 +308,57 @@ def test_a_drive_that_was_never_heard_of_is_not_there_unless_it_is_told_to_have_
 @pytest.mark.parametrize(
     ("past", "verdict"),
     [
-        (Past(), FINE),
-        (Past(Entry(Mark.CLEAR, 6, 2, "too fast")), FINE),
+        (Found(), FINE),
+        (Found(Record(Mark.CLEAR, 0x0206, "", "too fast")), FINE),
         (
-            Past(Entry(Mark.LIVE, 6, 2, "too fast")),
+            Found(Record(Mark.LIVE, 0x0206, "", "too fast")),
             Verdict(TripCause.POWER_AT_END, 0, "it ended while a drive had power, or the computer lost its supply"),
         ),
         (
-            Past(Entry(Mark.LATCHED, 6, 2, "too fast")),
+            Found(Record(Mark.LATCHED, 0x0206, "", "too fast")),
             Verdict(TripCause.OVERSPEED, 2, "since before the start: too fast"),
         ),
         (
-            Past(Entry(Mark.LATCHED, 6, 2, "since before the start: too fast")),
+            Found(Record(Mark.LATCHED, 0x0206, "", "since before the start: too fast")),
             Verdict(TripCause.OVERSPEED, 2, "since before the start: too fast"),
         ),
-        (Past(Entry(Mark.LATCHED, 0, 2, "?")), Verdict(TripCause.RECORD_UNUSABLE, 2, "since before the start: ?")),
-        (Past(Entry(Mark.LATCHED, 19, 2, "?")), Verdict(TripCause.RECORD_UNUSABLE, 2, "since before the start: ?")),
         (
-            Past(Entry(Mark.LIVE, 6, 2, "too fast"), "damaged"),
-            Verdict(TripCause.RECORD_UNUSABLE, 0, "the record of its last trip cannot be used: damaged"),
+            Found(Record(Mark.LATCHED, 0x0200, "", "?")),
+            Verdict(TripCause.RECORD_UNUSABLE, 2, "since before the start: ?"),
+        ),
+        (
+            Found(Record(Mark.LATCHED, 0x0213, "", "?")),
+            Verdict(TripCause.RECORD_UNUSABLE, 2, "since before the start: ?"),
+        ),
+        (
+            Found(Record(Mark.LIVE, 0x0206, "", "too fast"), Defect.GARBAGE, "/x"),
+            Verdict(
+                TripCause.RECORD_UNUSABLE,
+                0,
+                "the record of its last trip cannot be used: the record of stops is damaged (/x)",
+            ),
         ),
     ],
 )
-def test_it_starts_with_what_the_record_says_and_with_a_trip_when_it_says_nothing(past: Past, verdict: Verdict) -> None:
+def test_it_starts_with_what_the_record_says_and_with_a_trip_when_it_says_nothing(
+    past: Found, verdict: Verdict
+) -> None:
     assert before_the_start(past) == verdict
 
 
 def test_each_cause_that_can_be_written_is_the_same_after_the_start() -> None:
     for each in set(TripCause) - {TripCause.NONE}:
-        assert before_the_start(Past(Entry(Mark.LATCHED, int(each)))).cause is each
+        assert before_the_start(Found(Record(Mark.LATCHED, int(each)))).cause is each
+
+
+@pytest.mark.parametrize("opened", [False, True])
+@pytest.mark.parametrize("node_id", [0, 1, 127])
+@pytest.mark.parametrize("cause", set(TripCause) - {TripCause.NONE})
+def test_a_trip_has_its_cause_its_node_and_the_relay_in_its_code(cause: TripCause, node_id: int, opened: bool) -> None:
+    record = Record(Mark.LATCHED, code_of(Verdict(cause, node_id), opened=opened), "", "why")
+    assert before_the_start(Found(record)) == Verdict(cause, node_id, "since before the start: why")
+    assert has_opened(record) is opened
+    assert record.code < 1 << 16
 
 
 def test_causes_after_which_a_sensor_is_no_evidence() -> None:

@@ -1,7 +1,7 @@
 """Output that never waits for its reader: a terminal that is held (Ctrl-S), a full pipe, a journal that hangs.
 
-Standard library only. rclpy writes its log with Python's lock held: one line that waits would hold up every thread of
-the process, the control thread too. The watchdog has its own copy: it shares no code.
+rclpy writes its log with Python's lock held: one line that waits would hold up every thread of the process, the control
+thread too.
 """
 
 from __future__ import annotations
@@ -24,12 +24,17 @@ def never_wait(environment: Mapping[str, str], descriptors: Iterable[int] = STDO
     """
     for descriptor in descriptors:
         with contextlib.suppress(OSError):  # a closed descriptor; a terminal of another user
-            _never_wait(descriptor, environment.get(JOURNAL, ""))
+            _never_wait(descriptor, environment)
 
 
-def _never_wait(descriptor: int, journal: str) -> None:
+def is_journal(environment: Mapping[str, str], stream: os.stat_result) -> bool:
+    """The stream of systemd.exec(5)."""
+    return environment.get(JOURNAL) == f"{stream.st_dev}:{stream.st_ino}"
+
+
+def _never_wait(descriptor: int, environment: Mapping[str, str]) -> None:
     found = os.fstat(descriptor)
-    if stat.S_ISSOCK(found.st_mode) and journal == f"{found.st_dev}:{found.st_ino}":
+    if stat.S_ISSOCK(found.st_mode) and is_journal(environment, found):
         os.set_blocking(descriptor, False)
     if stat.S_ISFIFO(found.st_mode) or os.isatty(descriptor):
         own = os.open(f"/proc/self/fd/{descriptor}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)

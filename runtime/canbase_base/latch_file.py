@@ -15,13 +15,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from canbase_base import latch_record
 from canbase_base.latch_folder import PARTS, SUFFIX, forgetful, machine, wrong_access
+from canbase_base.latch_record import Defect, Found, Record
 from canbase_base.own_folder import FolderError, open_own_folder, replaced
-from canbase_runtime import latch_record
-from canbase_runtime.latch_record import Defect, Found, Record
 
 MOUNT: Final = "mount a folder of a disk there: a volume, for a container"
 RETRY_S: Final = 1.0
+STACK_BYTES: Final = 512 * 1024
 _OPEN: Final = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
 
@@ -148,11 +149,23 @@ class LatchKeeper(threading.Thread):
             self._wanted = record
             self._inbox.put(record)
 
-    def finish(self, timeout_s: float) -> None:
-        """Write the wanted record within this time [s], and end."""
+    def start(self) -> None:
+        """With a small stack: processes that lock their memory have all of it resident, 8 MB by default."""
+        usual = threading.stack_size(STACK_BYTES)
+        try:
+            super().start()
+        finally:
+            threading.stack_size(usual)
+
+    def finish(self, timeout_s: float) -> bool:
+        """Write the wanted record within this time [s], and end. Whether it is on disk."""
         self._inbox.put(None)
         if self.is_alive():
             self.join(timeout_s)
+        if self.is_alive():
+            return False
+        self._file.close()
+        return self.failure is None and not self.problem
 
     def run(self) -> None:
         """The thread's body."""
@@ -161,8 +174,6 @@ class LatchKeeper(threading.Thread):
                 pass
         except BaseException as error:  # noqa: BLE001 - the process sees it, stops the robot and ends by it
             self.failure = error
-        finally:
-            self._file.close()
 
     def _turn(self) -> bool:
         """Wait, write the newest; False: it is to end."""

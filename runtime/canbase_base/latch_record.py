@@ -6,7 +6,7 @@ Rules
 3. What cannot be read, is another robot's, or is only half there, counts as latched.
 
 A file is two slots of one page each. The older one is overwritten, so that a torn write leaves one that can be read;
-that the other cannot be read is enough to count as latched. The watchdog has the layout a second time, on purpose.
+that the other cannot be read is enough to count as latched.
 """
 
 from __future__ import annotations
