@@ -53,7 +53,8 @@ def _condition(robot: Robot, states: States) -> str | None:
     if driver and driver.watchdog is not WatchdogView.OK:
         return f"watchdog is {driver.watchdog.value}{because(driver.watchdog_cause)}; start or reset it"
     if driver and driver.state is not DriverState.ENABLED:
-        return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}"
+        remedy = "; canbase reset ends it, when its cause is gone" if driver.state is DriverState.LATCHED else ""
+        return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}{remedy}"
     if driver and not driver.hears_command:
         return "motor_driver receives no cmd_vel; is safety_filter running? After a start try again in a second"
     return _not_followed(robot, states)

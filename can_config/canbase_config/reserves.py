@@ -214,13 +214,19 @@ WITHOUT_RESERVE: Final = {
 
 
 def check(robot: Robot) -> None:
-    """Raises MisfitError for the first row that does not hold, with the least value that would."""
-    for row in RESERVES:
-        least = row.least(robot)
-        for loc in row.keys(robot):
-            given = at(robot, loc)
-            if given < least - ROUNDING:
-                raise MisfitError(_sentence(row, given, least), loc, *_locs(row, robot))
+    """Raises MisfitError for the rows that do not hold, each with the least value that would."""
+    misfits = [
+        (row, loc, at(robot, loc), least)
+        for row in RESERVES
+        for least in (row.least(robot),)
+        for loc in row.keys(robot)
+        if at(robot, loc) < least - ROUNDING
+    ]
+    if misfits:
+        row, loc, given, least = misfits[0]
+        others = [f"{row.key} ({given:g}): at least {rounded_up(least):g}" for row, _, given, least in misfits[1:]]
+        sentence = "; likewise ".join((_sentence(row, given, least), *others))
+        raise MisfitError(sentence, loc, *_locs(row, robot))
 
 
 def _sentence(row: Reserve, given: float, least: float) -> str:

@@ -49,7 +49,8 @@ def explain(
     recording: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="ASC (a black box), candump -L, BLF, TRC, or MCAP of canbase record export."
+            metavar="FILE",
+            help="ASC (a black box), watchdog_….jsonl, candump -L, BLF, TRC, or MCAP of canbase record export.",
         ),
     ],
     config: RecordingConfig = None,

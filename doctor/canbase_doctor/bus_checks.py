@@ -227,7 +227,10 @@ def _life(seen: BusEvidence, name: str, found: Inspection) -> Check:
         return warn(f"{name}: state", f"{told}; EMCY {emcy.text}", "remove the cause")
     node = seen.heard.nodes.get(found.node_id)
     if seen.heard.driver_lives and (node is None or node.nmt_state is not NmtState.OPERATIONAL):
-        return fail(f"{name}: state", f"{told}; it is not in NMT operational beside a driver", NOT_BOOTED)
+        told = f"{told}; it is not in NMT operational beside a driver"
+        if seen.heard.watchdog is not None and seen.heard.watchdog.state == TRIPPED:
+            return warn(f"{name}: state", told, "the watchdog stopped it: canbase reset boots it again")
+        return fail(f"{name}: state", told, NOT_BOOTED)
     return ok(f"{name}: state", told)
 
 

@@ -321,7 +321,9 @@ def _unprepared(axis: Axis) -> str:
         return ""
     place = f"{axis.drive.joint} (node {axis.drive.node_id})"
     local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
-    return f"{place} stays in {axis.state.text if axis.state else 'no state known'}: STO, main voltage?{local}"
+    return (
+        f"{place} is in {axis.state.text if axis.state else 'no state known'}; if it stays: STO, main voltage?{local}"
+    )
 
 
 def _disabled(axis: Axis) -> str:

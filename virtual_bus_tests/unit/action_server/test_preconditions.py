@@ -87,6 +87,7 @@ def test_every_state_of_the_driver_without_power_is_named_with_its_detail(state:
     driver = replace(GOOD_DRIVER, state=state, detail="left_wheel: 0x2310")
     assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == (
         f"motor_driver is {state.word}, not enabled: left_wheel: 0x2310"
+        + ("; canbase reset ends it, when its cause is gone" if state is DriverState.LATCHED else "")
     )
 
 

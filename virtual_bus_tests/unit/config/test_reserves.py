@@ -144,6 +144,9 @@ def test_a_footprint_that_leaves_a_wheel_out_is_refused_but_for_a_base_that_skid
         ValidationError, match=r"right_m \(0\.2\) is too little for the right wheel: at least 0\.25 \(base"
     ):
         Robot.model_validate(values)
+    values["safety"]["footprint"]["left_m"] = 0.2
+    with pytest.raises(ValidationError, match=r"left_m \(0\.2\) .*; likewise .*right_m \(0\.2\): at least"):
+        Robot.model_validate(values)
     more = [{**drive, "joint": f"{drive['joint']}_rear", "node_id": drive["node_id"] + 2} for drive in values["drives"]]
     values["drives"] = [*values["drives"], *more]
     Robot.model_validate(values)
