@@ -48,7 +48,7 @@ from canbase_velocity.placement import HeldPlacement, Placement, PlacementError,
 from canbase_velocity.qos import COMMAND, SCAN, STATE, STATIC_TF, listen_closely
 from canbase_velocity.safety_filter import FilterConfig, Inputs
 from canbase_velocity.speed_limit import SpeedLimits
-from canbase_velocity.steady import steady_timer
+from canbase_velocity.steady import next_turn, steady_timer
 from canbase_velocity.twist import Twist
 from canbase_velocity.unexpected_publishers import UNKNOWN
 
@@ -88,7 +88,7 @@ class FilterNode(Node):
         self._leases = LeaseSender(robot.lease.socket)
         self._lease_sequence = self._lease_errors_before = 0
         self._decision = self._filter.decide(time.monotonic())
-        self._state_at_s = -math.inf
+        self._state_due_s = -math.inf
         self._told: Inputs | None = None
         """What the last state was made of."""
         self._stands_from_s = -math.inf
@@ -306,7 +306,7 @@ class FilterNode(Node):
             sentence, priority, fields = changed_order(decision)
             self._event_log.write(sentence, priority, robot=self._robot.name, **fields)
         changed = decision.essence != before.essence
-        if not changed and now_s - self._state_at_s < STATE_PERIOD_S:
+        if not changed and now_s < self._state_due_s:
             return
         inputs = self._told = self._filter.inputs(now_s)
         for sentence, priority, fields in self._drops.news(inputs.scans, now_s):
@@ -316,4 +316,4 @@ class FilterNode(Node):
         )
         message.lease_sequence, message.lease_errors = self._lease_sequence, self._leases.errors
         self._states.publish(message)
-        self._state_at_s = now_s
+        self._state_due_s = next_turn(self._state_due_s, now_s, STATE_PERIOD_S)

@@ -43,7 +43,7 @@ from canbase_velocity.mux import NOT_FINITE, Mux, MuxDecision
 from canbase_velocity.mux_messages import diagnostics, mux_state
 from canbase_velocity.own_topics import wrong_topic
 from canbase_velocity.qos import ANY_COMMAND, COMMAND, DRIVER_STATUS, STATE, listen_closely, loud
-from canbase_velocity.steady import steady_timer
+from canbase_velocity.steady import next_turn, steady_timer
 from canbase_velocity.twist import Twist
 from canbase_velocity.unexpected_publishers import ForeignWatch
 
@@ -87,7 +87,7 @@ class MuxNode(Node):
         self._watch = ForeignWatch(expected(robot, self))
         self._heard = heard(robot)
         self._decision = self._mux.decide(time.monotonic())
-        self._state_at_s = -math.inf
+        self._state_due_s = -math.inf
         self._deaf: list[str] = []
         self._ending = False
         self._serialized = SerializedTwist(robot.base.base_frame)
@@ -238,9 +238,9 @@ class MuxNode(Node):
         if self._commands.get_subscription_count() > 0:
             order = decision.twist
             self._commands.publish(self._serialized.pack(order.linear_mps, order.angular_radps, stamp))
-        if decision.essence != self._decision.essence or now_s - self._state_at_s >= STATE_PERIOD_S:
+        if decision.essence != self._decision.essence or now_s >= self._state_due_s:
             self._states.publish(mux_state(decision, stamp))
-            self._state_at_s = now_s
+            self._state_due_s = next_turn(self._state_due_s, now_s, STATE_PERIOD_S)
         for sentence, priority, fields in changes(self._decision, decision):
             self._event_log.write(sentence, priority, robot=self._robot.name, **fields)
         self._decision = decision

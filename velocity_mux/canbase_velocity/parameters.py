@@ -54,7 +54,10 @@ class Parameters:
         try:
             for name, unit in UNITS.items():
                 most = getattr(self.limits.most, name.removeprefix(f"{LIMIT}."))
-                described = ParameterDescriptor(description=f"at most, 0: no motion; not above robot.yaml [{unit}]")
+                what = f"at most, 0: no motion; not above robot.yaml [{unit}]"
+                described = ParameterDescriptor(
+                    description=what, dynamic_typing=True
+                )  # `0` is an integer for ros2 param
                 node.declare_parameter(name, most, described)
         except (InvalidParameterValueException, InvalidParameterTypeException) as error:
             raise WrongStartError(f"{node.get_fully_qualified_name()}: {error}") from error

@@ -1,4 +1,4 @@
-"""Timers on the steady clock: no step of the system clock and no paused simulation holds up zeros and leases."""
+"""Timers on the steady clock, and what is due in them: no step of the system clock holds up zeros and leases."""
 
 from __future__ import annotations
 
@@ -13,3 +13,9 @@ from rclpy.timer import Timer
 def steady_timer(node: Node, period_s: float, callback: Callable[[], None]) -> Timer:
     """A timer of `node` on the steady clock."""
     return node.create_timer(period_s, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
+def next_turn(due_s: float, now_s: float, period_s: float) -> float:
+    """When something periodic that was due at `due_s` is due next. Cycles that come late do not add up; after a pause
+    nothing is made up for."""
+    return due_s + period_s if due_s + period_s > now_s else now_s + period_s

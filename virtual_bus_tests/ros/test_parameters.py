@@ -103,6 +103,13 @@ def test_a_limit_of_another_type_is_refused(chain: Chain) -> None:
     assert get(chain, LINEAR) == [1.0]
 
 
+def test_a_whole_number_is_a_limit(chain: Chain) -> None:
+    assert put(chain, speed_limit__linear_mps=0).successful
+    assert get(chain, LINEAR) == [0]
+    chain.joystick.message = drive(0.8)
+    chain.wait_for_cause(SafetyState.CAUSE_SPEED, "the parameters speed_limit of safety_filter: 0.80 m/s")
+
+
 LOOP = {"mux": {"sources": {"loop": {"topic": "/robot1/cmd_vel", "priority": 9, "timeout_s": 0.3}}}}
 STARTS: tuple[tuple[list[str], Mapping[str, Any], int | None, str], ...] = (
     (["--ros-args", "-p", f"{LINEAR}:=0.2"], {}, None, "speed limit 0.2 m/s"),

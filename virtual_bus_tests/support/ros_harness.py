@@ -163,7 +163,7 @@ class Repeater(Generic[T]):
             self.sent += 1
 
 
-BLACK_BOX = "motor_driver_black_box"
+BLACK_BOX = "_motor_driver_black_box"
 
 
 class TestNode:

@@ -26,7 +26,7 @@ from canbase_driver.runtime.black_box import EventEntry, Recording
 from canbase_runtime.joint_command import BaseVelocity, base_velocity
 from canbase_runtime.message_reader import MessageReader
 
-NODE = "motor_driver_black_box"
+NODE = "_motor_driver_black_box"
 ORDER = "order"
 """What the events are."""
 FASTEST_HZ = 50.0

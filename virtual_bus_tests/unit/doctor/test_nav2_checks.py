@@ -22,7 +22,7 @@ VALUES = {
 GOOD = {
     "cmd_vel_controller": (("controller_server", "behavior_server"), ("velocity_smoother",)),
     "cmd_vel_smoothed": (("velocity_smoother",), ("collision_monitor",)),
-    "cmd_vel_nav": (("collision_monitor",), ("velocity_mux", "motor_driver_black_box")),
+    "cmd_vel_nav": (("collision_monitor",), ("velocity_mux", "_motor_driver_black_box")),
     "cmd_vel_docking": (("docking_server",), ("velocity_mux",)),
     "cmd_vel_teleop": (("joystick",), ("behavior_server",)),
     "cmd_vel_mux": (("velocity_mux",), ()),
