@@ -4,6 +4,7 @@ a second publisher of a state. Nothing moves when the lock opens, or when that p
 
 from __future__ import annotations
 
+import asyncio
 import math
 import re
 import shutil
@@ -11,7 +12,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +26,14 @@ from geometry_msgs.msg import Point, TwistStamped
 from nav2_msgs.action import BackUp, Spin
 from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
 from std_msgs.msg import Bool
 
-from canbase_action_server.client import RejectedError
-from canbase_action_server.outcome import ErrorCode
+from canbase_action_server.client import DriveClient, RejectedError
+from canbase_action_server.outcome import ErrorCode, Status
+from canbase_action_server.rotate_client import RotateClient
 from canbase_config.state_age import STATE_PERIOD_S, state_timeout_s
 from canbase_velocity.mux_node import GRAPH_PERIOD_S
 from ros.conftest import Spawn
@@ -109,6 +115,48 @@ def in_cpp(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 
 CPP = pytest.param("in_cpp", marks=pytest.mark.skipif(not has_rclcpp(), reason="rclcpp_action is not installed"))
+
+
+EXECUTORS: dict[str, Callable[..., Any]] = {
+    "single": SingleThreadedExecutor,
+    "multi": partial(MultiThreadedExecutor, 3),
+    "events": EventsExecutor,
+}
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_two_clients_on_one_node_drive_with_each_executor(paused: Paused, executor: str) -> None:
+    context = paused.robot.node.node.context
+    node, spins = Node("application", context=context), EXECUTORS[executor](context=context)
+    spins.add_node(node)
+    drive, rotate = DriveClient(node), RotateClient(node)
+    for client, way, speed in ((drive, 0.1, 0.3), (rotate, 0.2, 1.0)):
+        result = client.send(way, speed, discovery_timeout_s=RESULT_S).wait(RESULT_S)
+        assert result is not None
+        assert result.status is Status.SUCCEEDED
+    drive.close()
+    rotate.close()
+    spins.shutdown()
+    node.destroy_node()
+
+
+def test_an_application_of_asyncio_waits_in_a_thread_and_its_loop_runs_on(paused: Paused) -> None:
+    node, turns = Node("application", context=paused.robot.node.node.context), 0
+    client = DriveClient(node)
+
+    async def application() -> Any:
+        nonlocal turns
+        goal = await asyncio.to_thread(client.send, 0.1, 0.3, discovery_timeout_s=RESULT_S)
+        result = asyncio.create_task(asyncio.to_thread(goal.wait, RESULT_S))
+        while not result.done():
+            await asyncio.sleep(0.01)
+            turns += 1
+        return result.result()
+
+    assert asyncio.run(application()).status is Status.SUCCEEDED
+    assert turns > 10
+    client.close()
+    node.destroy_node()
 
 
 @pytest.mark.parametrize("language", ["in_python", CPP])
