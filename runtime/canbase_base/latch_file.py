@@ -10,7 +10,6 @@ import errno
 import os
 import queue
 import shutil
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -19,10 +18,10 @@ from canbase_base import latch_record
 from canbase_base.latch_folder import PARTS, SUFFIX, forgetful, machine, wrong_access
 from canbase_base.latch_record import Defect, Found, Record
 from canbase_base.own_folder import FolderError, open_own_folder, replaced
+from canbase_base.small_thread import SmallThread
 
 MOUNT: Final = "mount a folder of a disk there: a volume, for a container"
 RETRY_S: Final = 1.0
-STACK_BYTES: Final = 512 * 1024
 _OPEN: Final = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
 
@@ -126,7 +125,7 @@ class LatchFile:
         self._descriptor, self._sequence = os.open(self.path, os.O_RDWR | _OPEN), 2
 
 
-class LatchKeeper(threading.Thread):
+class LatchKeeper(SmallThread):
     """Writes what a loop wants on disk, so that the loop never waits for one. `failure`: the defect that ended it."""
 
     def __init__(self, file: LatchFile) -> None:
@@ -148,14 +147,6 @@ class LatchKeeper(threading.Thread):
         if record is not self._wanted:
             self._wanted = record
             self._inbox.put(record)
-
-    def start(self) -> None:
-        """With a small stack: processes that lock their memory have all of it resident, 8 MB by default."""
-        usual = threading.stack_size(STACK_BYTES)
-        try:
-            super().start()
-        finally:
-            threading.stack_size(usual)
 
     def finish(self, timeout_s: float) -> bool:
         """Write the wanted record within this time [s], and end. Whether it is on disk."""

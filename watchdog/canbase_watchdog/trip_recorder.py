@@ -9,13 +9,13 @@ import itertools
 import logging
 import queue
 import re
-import threading
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from canbase_base.latch_record import Found
 from canbase_base.own_folder import replaced
+from canbase_base.small_thread import SmallThread
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import input_ring
 from canbase_watchdog.input_ring import Cut, InputRing, Trip, TripWatch
@@ -25,8 +25,6 @@ WAITING = 4
 LINES_AT_ONCE = 20
 PAUSE_S = 0.001
 """A pause after this many lines: the loop never waits for the interpreter longer than they take, 0.2 ms."""
-STACK_BYTES = 512 * 1024
-"""As of the record's writer: the watchdog locks its memory."""
 SUFFIX = ".jsonl"
 
 _log = logging.getLogger("canbase.watchdog")
@@ -40,7 +38,7 @@ def folder_of(config: WatchdogConfig, environment: Mapping[str, str], home: Path
     return Path(given or Path(environment.get("XDG_STATE_HOME") or home / ".local" / "state") / "canbase")
 
 
-class TripRecorder(threading.Thread):
+class TripRecorder(SmallThread):
     """Has a file written for each trip of this life."""
 
     def __init__(self, ring: InputRing, config: WatchdogConfig, past: Found | None, folder: Path) -> None:
@@ -51,14 +49,6 @@ class TripRecorder(threading.Thread):
         self._watch = TripWatch(ring, past)
         self._jobs: queue.Queue[tuple[Trip, Cut, float] | None] = queue.Queue(WAITING)
         self._problem = ""
-
-    def start(self) -> None:
-        """With a small stack."""
-        usual = threading.stack_size(STACK_BYTES)
-        try:
-            super().start()
-        finally:
-            threading.stack_size(usual)
 
     def record_due_trip(self, watchdog: Watchdog, now_s: float) -> None:
         """After each tick: a trip whose file is due goes to the writer. Never waits."""
