@@ -156,3 +156,26 @@ def test_without_a_keeper_every_wish_is_on_disk() -> None:
     ledger = WriteAhead(None)
     ledger.want(Mark.LIVE)
     assert ledger.is_on_disk
+
+
+@pytest.mark.parametrize(
+    ("found", "sentence"),
+    [
+        (Found(), ""),
+        (Found(defect=Defect.MISSING, detail="/x"), "there is no record of stops (/x), so the last stop is taken for"),
+        (Found(Record(Mark.LIVE)), "it ended while there was power: killed"),
+        (Found(LATCHED), "latched since before the start: left_wheel: node 1 is in fault"),
+        (Found(Record(Mark.LATCHED, 7, "drive fault")), "latched since before the start: drive fault"),
+        (Found(Record(Mark.LATCHED, 7, "", "latched since before the start: x")), "latched since before the start: x"),
+    ],
+    ids=str,
+)
+def test_a_latched_record_says_why_and_a_clear_one_nothing(found: Found, sentence: str) -> None:
+    assert found.sentence.startswith(sentence)
+    assert bool(found.sentence) is bool(sentence) is found.latched
+
+
+def test_a_clear_record_without_a_code_says_nothing_and_every_other_one_something() -> None:
+    assert Found().says_nothing
+    assert not Found(Record(code=1)).says_nothing
+    assert not Found(Record(Mark.LIVE)).says_nothing
