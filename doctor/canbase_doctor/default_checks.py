@@ -63,7 +63,11 @@ def _counters(before: DriverStatus, now: DriverStatus) -> Check:
     grew = _grew(_counts(before), _counts(now))
     if not grew:
         return ok("its counters", told)
-    return warn("its counters", told, f"{grew} grew while doctor listened; docs/bus.md explains them")
+    return warn(
+        "its counters",
+        told,
+        f"{grew} grew while doctor listened: docs/troubleshooting.md, Counters of the driver, explains them",
+    )
 
 
 def _counts(status: DriverStatus) -> dict[str, int]:
@@ -80,7 +84,13 @@ def watchdog(evidence: Evidence) -> list[Check]:
     heard = evidence.on("motor_driver/status")
     status = heard.last
     if status is None:
-        return [fail("watchdog", "unknown: reported by motor_driver, which is not running", PARTS_RUN)]
+        return [
+            fail(
+                "watchdog",
+                "unknown: reported by motor_driver, which does not answer (not running, or it hangs)",
+                PARTS_RUN,
+            )
+        ]
     age, view = _age(status.watchdog_age_s), watchdog_view(status.watchdog)
     if view is WatchdogView.MISSING:
         return [fail("watchdog", f"missing, last frame {age} ago", "start canbase serve watchdog with this robot.yaml")]

@@ -68,7 +68,9 @@ def _wheel(trace: AxisTrace, scene: Scene, since_s: float) -> WheelStop:
     steps = _steps(trace, scene, from_s)
     moved_s = _last_motion(trace, scene, from_s, steps)
     if moved_s >= last_s:
-        return WheelStop(trace.name, None, trace.travel(since_s, last_s), unit, "it still moves at the end")
+        return WheelStop(
+            trace.name, None, trace.travel(since_s, last_s), unit, f"it moves in the last 6064h, at {last_s:.3f} s"
+        )
     gap = next(((a_s, b_s) for a_s, b_s, _ in steps if a_s < moved_s and _is_gap(scene, a_s, b_s)), None)
     if gap is not None:
         return WheelStop(trace.name, None, None, unit, f"6064h is missing from {gap[0]:.3f} to {gap[1]:.3f} s")

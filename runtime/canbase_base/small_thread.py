@@ -9,7 +9,7 @@ STACK_BYTES: Final = 512 * 1024
 
 
 class SmallThread(threading.Thread):
-    """Threads that start later have the usual stack."""
+    """The size is the process's: start such threads from its main thread, and later ones have the usual stack."""
 
     def start(self) -> None:
         """As Thread does it."""

@@ -16,6 +16,8 @@ def steady_timer(node: Node, period_s: float, callback: Callable[[], None]) -> T
 
 
 def next_turn(due_s: float, now_s: float, period_s: float) -> float:
-    """When something periodic that was due at `due_s` is due next. Cycles that come late do not add up; after a pause
-    nothing is made up for."""
+    """When something periodic that is due at `due_s` is due next, looked at at `now_s`. Cycles that come late do not
+    add up, after a pause nothing is made up for, and what is published in between delays none."""
+    if now_s < due_s:
+        return due_s
     return due_s + period_s if due_s + period_s > now_s else now_s + period_s

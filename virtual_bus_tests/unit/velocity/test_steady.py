@@ -20,6 +20,14 @@ def test_late_cycles_do_not_make_a_state_rarer(command_hz: float) -> None:
     assert 999 <= sent <= 1001
 
 
+def test_what_is_published_in_between_delays_none() -> None:
+    """5 s of changes in each cycle, each published, then none: the next one comes within its period."""
+    due_s = 0.0
+    for cycle in range(250):
+        due_s = next_turn(due_s, cycle / 50.0, 0.1)
+    assert due_s <= 249 / 50.0 + 0.1
+
+
 def test_after_a_pause_nothing_is_made_up_for() -> None:
     assert next_turn(1.0, 5.0, 0.1) == 5.1
     assert next_turn(float("-inf"), 5.0, 0.1) == 5.1
