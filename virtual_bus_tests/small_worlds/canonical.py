@@ -44,6 +44,11 @@ IGNORED = {
         "WatchdogState.lease_age_ms"
     ),
     "a text for people": "Verdict.detail Decision.detail Finding.detail Record.detail",
+    "evidence for a sentence alone, of all steps since the boot": (
+        "FeedbackFactor._at FeedbackFactor._raw FeedbackFactor._counts FeedbackFactor._steps "
+        "FeedbackFactor._velocity_mps FeedbackFactor._way_m FeedbackFactor._shown_m FeedbackFactor._xx "
+        "FeedbackFactor._xy FeedbackFactor._yy"
+    ),
     "what was published last": (
         "VelocityProcess._told VelocityProcess._mux_told Watchdog._reported_status DriverProcess._told Axis._told "
         "DriverProcess.snapshot CanopenNode._measures CanopenNode.report NodeBoot.report"
@@ -58,7 +63,8 @@ IGNORED = {
         "WatchdogState.answered BaseReady._cycles"
     ),
     "a place on an endless way: the steps between two samples decide, and both are those of now": (
-        "DriverCore._feed Axis.travel Axis.encoder_offset Stillness._travel_m StoppingDistance._travel_m "
+        "DriverCore._feed Axis.travel Axis._raw_position Axis.encoder_offset Stillness._travel_m "
+        "StoppingDistance._travel_m "
         "Plausibility._counts Plausibility._counts_before TorqueWatch._counts TorqueWatch._counts_before "
         "StandstillWatch._counts TorqueEvidence._travel_m"
     ),
