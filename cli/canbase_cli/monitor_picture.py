@@ -67,7 +67,8 @@ def line(snapshot: Snapshot) -> str:
         words += [
             f"lock {lock.name} {lock_standing(lock.standing).word}" for lock in snapshot.mux.message.locks if lock.holds
         ]
-        words += [f"foreign publisher {foreign.node} on {foreign.topic}" for foreign in snapshot.mux.message.foreign]
+        unexpected = snapshot.mux.message.foreign
+        words += [f"foreign publisher {each.node} on {each.topic}: {each.problem}" for each in unexpected]
     if snapshot.driver.fresh:
         words += [f"{drive.joint} {drive.state}" for drive in snapshot.driver.message.drives]
     return "  |  ".join(words)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from canbase.msg import DriverStatus, SafetyState
+from canbase.msg import DriverStatus, MuxState, SafetyState
 
 from canbase_doctor.check import RESTART, Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
@@ -195,19 +195,27 @@ def _scanner(scanner: Any, dropped: int) -> Check:
 
 
 def velocity_mux(evidence: Evidence) -> list[Check]:
-    """Which nodes drive, and which publish a value that is not finite."""
+    """Which nodes drive, and which publish what they should not: another type, a value that is not finite."""
     state = evidence.on("velocity_mux/state").last
     if silent := _silent(evidence, "velocity_mux", "velocity_mux/state"):
         return [silent]
+    cure = (
+        "end that publisher, or let it publish what is expected (`stamped` of the source in robot.yaml: Twist or not)"
+    )
+    unexpected = [warn(f"publisher on {each.topic}", f"{each.node}: {each.problem}", cure) for each in state.foreign]
+    return [_mux(state), *unexpected]
+
+
+def _mux(state: MuxState) -> Check:
     ignored = [source for source in state.sources if source.active and source_standing(source.standing) in UNFOLLOWED]
     if ignored:
         told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
-        return [fail("velocity_mux", told, UNFOLLOWED[source_standing(ignored[0].standing)])]
+        return fail("velocity_mux", told, UNFOLLOWED[source_standing(ignored[0].standing)])
     found = f"{state.active} drives" if state.active else "no active source"
     bad = [source.name for source in state.sources if source.refused]
     if bad:
-        return [warn("velocity_mux", f"{found}; refused NaN or infinity of {', '.join(bad)}", "correct that sender")]
-    return [ok("velocity_mux", found)]
+        return warn("velocity_mux", f"{found}; refused NaN or infinity of {', '.join(bad)}", "correct that sender")
+    return ok("velocity_mux", found)
 
 
 CHECKS: tuple[Callable[[Evidence], list[Check]], ...] = (

@@ -198,5 +198,5 @@ def test_the_line_tells_locks_and_foreign_publishers() -> None:
     foreign = ForeignPublisher(topic="/cmd_vel", node="/evil", problem="only /safety_filter should")
     mux = MuxState(locks=[lock], foreign=[foreign])
     text = line(Snapshot("/", mux=LastMessage(mux, 0.0)))
-    assert "lock pause silent  |  foreign publisher /evil on /cmd_vel" in text
+    assert "lock pause silent  |  foreign publisher /evil on /cmd_vel: only /safety_filter should" in text
     assert "/evil publishes on /cmd_vel: only /safety_filter should" in drawn(Snapshot("/", mux=LastMessage(mux, 0.0)))

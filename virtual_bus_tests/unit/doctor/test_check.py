@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from canbase.msg import DriverStatus, DriveStatus, MuxSource, MuxState, SafetyState, ScannerState
+from canbase.msg import DriverStatus, DriveStatus, ForeignPublisher, MuxSource, MuxState, SafetyState, ScannerState
 from rich.console import Console
 
 from canbase_config.load import load_robot, sample
@@ -138,6 +138,11 @@ def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> Non
         (
             changed("velocity_mux/state", sources=[MuxSource(name="joystick", refused=3)]),
             "velocity_mux", "warn", "joystick",
+        ),
+        (
+            changed("velocity_mux/state", foreign=[ForeignPublisher(
+                topic="/cmd_vel_joy", node="/push", problem="of type geometry_msgs/msg/Twist, which is not received")]),
+            "publisher on /cmd_vel_joy", "warn", "/push: of type geometry_msgs/msg/Twist, which is not received end",
         ),
     ],
 )  # fmt: skip
