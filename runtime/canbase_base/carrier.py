@@ -3,8 +3,6 @@
 The kernel takes what is sent on such an interface, drops it, and reports no error. It reports bus-off once, by an
 error frame at that moment: a process that opens the interface later receives no report (linux: can_bus_off, net/sched
 noop_qdisc).
-
-The watchdog has a copy of its own; a test compares both.
 """
 
 from __future__ import annotations

@@ -97,13 +97,13 @@ class LatchFile:
     def _read(self) -> Found:
         writable, folder = True, open_own_folder(self.path.parent)
         try:
-            self._descriptor = os.open(self.path.name, os.O_RDWR | _OPEN, dir_fd=folder)
-            wrong = wrong_access(self._descriptor, folder, self.path)
-        except OSError as error:
-            if error.errno != errno.EROFS:
-                raise
-            writable = False
-            self._descriptor = os.open(self.path.name, os.O_RDONLY | _OPEN, dir_fd=folder)
+            try:
+                self._descriptor = os.open(self.path.name, os.O_RDWR | _OPEN, dir_fd=folder)
+            except OSError as error:
+                if error.errno != errno.EROFS:
+                    raise
+                writable = False
+                self._descriptor = os.open(self.path.name, os.O_RDONLY | _OPEN, dir_fd=folder)
             wrong = wrong_access(self._descriptor, folder, self.path)
         finally:
             os.close(folder)

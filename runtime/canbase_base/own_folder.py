@@ -2,8 +2,7 @@
 
 A process that works by path in a folder of another user opens, replaces and gives away whatever that user puts there.
 So the path is walked with descriptors, and each folder on it is judged before the next one is opened or made in it.
-Where every folder is trusted, no other user can move one of them afterwards. There are two copies of this file with the
-same text: the watchdog shares no code.
+Where every folder is trusted, no other user can move one of them afterwards.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What the processes of the robot share at run time: the journal, systemd, locks, latch files. No robot.yaml."""
+"""What the ROS processes share at run time: states, causes, receive times, the journal. See also canbase_base."""
