@@ -14,6 +14,7 @@ from canbase_runtime.watchdog_view import WatchdogView
 NO_SOURCE = (
     "mux.sources has no stamped source with topic cmd_vel_action: the mux would receive no command of a goal; add it"
 )
+RESET = "; canbase reset ends it, when its cause is gone"
 
 
 def commanding_program(robot: Robot, states: States) -> str:
@@ -51,9 +52,10 @@ def _condition(robot: Robot, states: States) -> str | None:
     if safety and (safety.estop or safety.cause.is_estop):
         return f"emergency stop holds: {safety.detail}; release it and reset"
     if driver and driver.watchdog is not WatchdogView.OK:
-        return f"watchdog is {driver.watchdog.value}{because(driver.watchdog_cause)}; start or reset it"
+        remedy = RESET if driver.watchdog is WatchdogView.TRIPPED else "; does it run, and is its bus well?"
+        return f"watchdog is {driver.watchdog.value}{because(driver.watchdog_cause)}{remedy}"
     if driver and driver.state is not DriverState.ENABLED:
-        remedy = "; canbase reset ends it, when its cause is gone" if driver.state is DriverState.LATCHED else ""
+        remedy = RESET if driver.state is DriverState.LATCHED else ""
         return f"motor_driver is {driver.state.word}, not enabled: {driver.detail}{remedy}"
     if driver and not driver.hears_command:
         return "motor_driver receives no cmd_vel; is safety_filter running? After a start try again in a second"
@@ -64,7 +66,7 @@ def _not_followed(robot: Robot, states: States) -> str | None:
     """The drives have power, and the commands of a goal would not reach them."""
     safety, mux = states.safety, states.mux
     if mux and mux.active not in ("", robot.mux.action_source):
-        return f"{mux.active} drives now; release it first"
+        return f"{mux.active} has the base; release it first"
     if safety and safety.stops and safety.cause in SCAN_LOST:
         return f"laser scan lost: {safety.detail}; is the scanner running?"
     if safety and safety.stops and safety.cause is not StopCause.OBSTACLE:  # the way back from one is free

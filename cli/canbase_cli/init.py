@@ -30,9 +30,11 @@ def init(
     ),
     timeout_s: SdoTimeoutOption = 0.3,
     answers: Annotated[
-        Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for tests.")
+        Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for scripts.")
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Take the proposed answer of each question.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="Take the proposed answer of each question that has one.")
+    ] = False,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Ask and be answered in lines of JSON, for another program: docs/ros_api.md."),
@@ -44,6 +46,10 @@ def init(
     ratio of every drive by SDO, which changes nothing. It asks for what no drive reports: sides, wheels, edges, speed.
     A bare Enter takes the proposed answer. The file passes `canbase config check`; an existing file is kept. Drives
     fresh from the box often have one node id all, or another bit rate: `canbase bus adopt` comes first for them.
+
+    Keys of --answers: name, nodeN.side, nodeN.gear_ratio, nodeN.counts_per_motor_rev, nodeN.velocity_unit (N: node id),
+    wheel_radius_m, track_m, front_m, rear_m, half_width_m, linear_mps, scanner, scanner.x_m, scanner.y_m,
+    scanner.yaw_deg, scanner.upside_down, estop.
 
     Exit codes: 0 written, 1 no drives, another master or values that do not fit, 2 wrong command line.
     """

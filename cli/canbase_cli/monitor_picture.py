@@ -81,9 +81,8 @@ def _mux_word(last: LastMessage) -> Text:
     holder = next((source for source in state.sources if source.active), None)
     if holder is None:
         return Text("no active source", WARN)
-    standing = source_standing(holder.standing)
-    if standing is not SourceStanding.FOLLOWED:
-        return Text(f"{holder.name} is not followed: {standing.word}", BAD)
+    if source_standing(holder.standing) is not SourceStanding.FOLLOWED:
+        return Text(f"{holder.name} is not followed: {holder.reason}", BAD)
     return Text(f"{holder.name} drives", GOOD)
 
 

@@ -17,7 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from canbase_cli.log_format import log_times
 from canbase_cli.middleware import prefer_udp, stay_on_this_computer, take_no_profile_from_here
-from canbase_runtime.terminal import FAILED, CommandError, colour, fail
+from canbase_runtime.terminal import FAILED, ROBOT_HERE, CommandError, colour, fail
 from canbase_runtime.wrong_start import WrongStartError
 
 ROS_USAGE: Final = "[OPTIONS] [--ros-args …]"
@@ -86,7 +86,7 @@ def _namespace(text: str) -> str:
 
 ConfigOption = Annotated[
     Path | None,
-    typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the robot here"),
+    typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default=ROBOT_HERE),
 ]
 RobotFile = Annotated[
     Path | None, typer.Argument(metavar="[FILE]", help="The same as --config FILE.", show_default=False)

@@ -95,7 +95,7 @@ def clear_first_records(robot: Robot, *, simulated: bool = False) -> None:
 
 def _claim(robot: Robot) -> Claim:
     """Of the driver, before its node is imported; ends the command where it cannot be had."""
-    from canbase_driver.runtime.bus_port import BusError
+    from canbase_base.frame_socket import BusError
     from canbase_driver.runtime.claim import Claim
 
     try:

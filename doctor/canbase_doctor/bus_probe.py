@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from typing import Final
 
+from canbase_base.frame_socket import BusError
 from canbase_commissioning.bus_monitor import Listener, ListenSession
 from canbase_commissioning.can_interface import Link
 from canbase_commissioning.onbus.bus_session import BusSession
@@ -14,7 +15,6 @@ from canbase_config.robot import Robot
 from canbase_doctor.bus_checks import BusEvidence
 from canbase_doctor.inspection import Inspection, inspect
 from canbase_driver.boot.node_boot import sdo_client
-from canbase_driver.runtime.bus_port import BusError
 
 LISTEN_S: Final = 1.2
 """Long enough for heartbeats of a second."""

@@ -29,7 +29,7 @@ from canbase_doctor.bundle_filter import LINES, Filter, environment, journal_tex
 from canbase_doctor.bundle_words import Words, own_words
 from canbase_doctor.careful_read import RefusedError, modified, names, read_end
 from canbase_doctor.service_environment import service_environment
-from canbase_runtime.terminal import FAILED, colour, fail
+from canbase_runtime.terminal import FAILED, ROBOT_HERE, colour, fail
 from canbase_runtime.which_robot import ETC, NoRobotError, which_robot
 
 if TYPE_CHECKING:  # `canbase --help` loads no configuration
@@ -275,7 +275,7 @@ def _packages() -> str:
 def support_bundle(
     config: Annotated[
         Path | None,
-        typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default="the robot here"),
+        typer.Option("--config", "-c", metavar="FILE", help="The robot.yaml.", show_default=ROBOT_HERE),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .tar.gz.", show_default="here, by date")

@@ -9,6 +9,7 @@ Identifiers have the flags of linux/can.h above them. Whatever is greater than M
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import socket
@@ -48,6 +49,11 @@ _FLAGS: Final = (
 )  # fmt: skip
 """Fields of a datagram that are all false in a plain frame."""
 _FIELDS: Final = frozenset({"timestamp", "arbitration_id", "channel", "dlc", "data", *_FLAGS})
+_CHECK: Final = "Check `bus` in robot.yaml or --channel, and that the interface is up (ip -details link show)."
+_ADVICE: Final[Mapping[int | None, str]] = {
+    errno.EAFNOSUPPORT: "This Linux has no SocketCAN: sudo modprobe can_raw.",
+    errno.ENODEV: f"No such interface: is the adapter connected, and its kernel module loaded? {_CHECK}",
+}
 
 Received = tuple[int, bytes, float]
 """Identifier with flags, data, and when the kernel received it by the wall clock [s]; 0.0: unknown."""
@@ -73,10 +79,21 @@ class FrameSocket(Protocol):
         """Close the bus."""
 
 
+class BusError(Exception):
+    """The bus cannot be opened, or not be used. The text has the likely reason, and what to look at."""
+
+
 def open_bus(arguments: Mapping[str, Any]) -> FrameSocket:
-    """Opens `can.Bus(**arguments)`. Raises what python-can raises: can.CanError, OSError, ValueError, TypeError,
-    ImportError, NotImplementedError.
-    """
+    """Opens `can.Bus(**arguments)`. Raises BusError."""
+    try:
+        return _opened(arguments)
+    except (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError) as error:
+        named = f"{arguments.get('interface')} {arguments.get('channel')}"
+        advice = _ADVICE.get(getattr(error, "errno", None), _CHECK)
+        raise BusError(f"the CAN bus {named} cannot be opened: {error}. {advice}") from error
+
+
+def _opened(arguments: Mapping[str, Any]) -> FrameSocket:
     bus = can.Bus(**arguments)
     try:
         keep_to_this_computer(arguments, bus)

@@ -21,11 +21,6 @@ class SourceStanding(IntEnum):
     LOWER_PRIORITY = 7
     SHUTDOWN = 8
 
-    @property
-    def word(self) -> str:
-        """In a headline."""
-        return "not armed" if self is SourceStanding.UNARMED else self.name.lower().replace("_", " ")
-
 
 IGNORED = frozenset({SourceStanding.UNARMED, SourceStanding.DELAYED})
 """The source has the base and is not followed: the order is zero, and no lower source moves the base."""

@@ -21,6 +21,8 @@ FAILED: Final = 1
 """Exit code: the command was called correctly and did not succeed."""
 WRONG_INPUT: Final = 2
 """Exit code: the command line or robot.yaml has to be changed; typer uses it for the command line too."""
+ROBOT_HERE: Final = "CANBASE_ROBOT; the robot that runs or is installed here; ./robot.yaml"
+"""Whose robot.yaml is meant without --config (which_robot.py), in a help."""
 _COLOURS: Final = "\x1b\\[[0-9;]*m"
 _CURSOR: Final = "\r|\x1b\\[[?0-9;]*[ABCDHJKhlm]"
 _CONTROLS: Final = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"

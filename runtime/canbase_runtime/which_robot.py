@@ -69,7 +69,9 @@ def choose(given: Path | None, variable: str, here: Mapping[Path, str], local: P
         return Meant(path, why)
     if local is not None:
         return Meant(local, "in this folder")
-    raise NoRobotError(f"no robot is named, runs or is installed here{refused and f', and {refused}'}. {OTHERS}")
+    raise NoRobotError(
+        f"no robot is named, and none of this user runs or is installed here{refused and f', and {refused}'}. {OTHERS}"
+    )
 
 
 def which_robot(given: Path | None) -> Meant:

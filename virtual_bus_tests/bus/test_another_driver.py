@@ -10,11 +10,11 @@ from pathlib import Path
 import can
 import pytest
 
+from canbase_base.frame_socket import BusError
 from canbase_base.single_instance import TakenError
 from canbase_config.load import load_robot, sample
 from canbase_config.robot import Robot
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.runtime.bus_port import BusError
 from canbase_driver.runtime.claim import Claim
 
 pytestmark = pytest.mark.bus

@@ -14,6 +14,7 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 
+from canbase_base.frame_socket import BusError
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.runtime import bus_port
 from canbase_driver.runtime.bus_port import (
@@ -22,7 +23,6 @@ from canbase_driver.runtime.bus_port import (
     RECEIVE_FAILURES,
     SEND_FAILURES,
     SEND_TIMEOUT_S,
-    BusError,
     BusPort,
 )
 from canbase_driver.runtime.bus_traffic import Traffic

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
 import random
 import socket
@@ -161,6 +162,27 @@ def test_a_number_in_the_place_of_the_data_takes_no_memory(
     assert made == []
     reader.close()
     sender.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("problem", "advice"),
+    [
+        (OSError(errno.EAFNOSUPPORT, "no"), "sudo modprobe can_raw"),
+        (OSError(errno.ENODEV, "no"), "is the adapter connected"),
+        (OSError(errno.EPERM, "no"), "Check `bus` in robot.yaml or --channel"),
+        (can.CanInitializationError("no"), "Check `bus` in robot.yaml or --channel"),
+        (ImportError("no"), "Check `bus` in robot.yaml or --channel"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_is_named_with_what_to_do(
+    problem: Exception, advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(**_arguments: object) -> None:
+        raise problem
+
+    monkeypatch.setattr(can, "Bus", refuses)
+    with pytest.raises(frame_socket.BusError, match=f"the CAN bus socketcan can0 cannot be opened: .*{advice}"):
+        frame_socket.open_bus({"interface": "socketcan", "channel": "can0"})
 
 
 def test_what_it_writes_is_a_frame_for_python_can(udp: dict[str, Any]) -> None:

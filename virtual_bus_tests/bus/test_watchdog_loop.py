@@ -14,8 +14,9 @@ from pathlib import Path
 import can
 import pytest
 
+from canbase_base.frame_socket import BusError
 from canbase_watchdog import loop
-from canbase_watchdog.bus_port import BusError, BusPort
+from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.frames import Frame
 from canbase_watchdog.lease_socket import LeaseSocket, LeaseSocketError
 from canbase_watchdog.loop import BusDeadError, Loop

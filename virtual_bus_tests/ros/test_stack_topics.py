@@ -133,7 +133,14 @@ def test_stamps_of_the_odometry_rise_and_its_pose_can_be_reset_at_a_standstill(w
 
 
 def test_status_tells_that_all_is_well(world: World) -> None:
-    status = world.robot.wait_state(DriverStatus.ENABLED)
+    """For a moment of each standstill the drives are "switched on": the stand is proven without torque."""
+
+    def with_torque() -> DriverStatus | None:
+        status = world.robot.wait_state(DriverStatus.ENABLED)
+        return status if status.drives[0].state == "operation enabled" else None
+
+    status = world.node.wait_for(with_torque, 2.0, "the torque again, after the proof of a stand")
+    assert status is not None
     assert (status.cause, status.watchdog, status.watchdog_cause) == ("none", DriverStatus.WATCHDOG_OK, "none")
     assert status.standstill
     assert status.command_fresh

@@ -18,11 +18,11 @@ from pathlib import Path
 from types import FrameType
 
 from canbase_base import single_instance as sole
+from canbase_base.frame_socket import BusError
 from canbase_base.latch_folder import SUFFIX, latch_folder
 from canbase_base.output import never_wait
 from canbase_base.sd_notify import notify
 from canbase_config.watchdog import WatchdogConfig
-from canbase_watchdog.bus_port import BusError
 from canbase_watchdog.lease_socket import LeaseSocketError
 from canbase_watchdog.life import RecordError, live
 from canbase_watchdog.log import Lines, formatter

@@ -16,9 +16,10 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from canbase_base.frame_socket import BusError
 from canbase_config.watchdog import WatchdogConfig
 from canbase_watchdog import frames
-from canbase_watchdog.bus_port import BusError, BusPort
+from canbase_watchdog.bus_port import BusPort
 from canbase_watchdog.frames import Frame
 
 QUICK_STOPS = 3

@@ -132,7 +132,7 @@ def held_sentence(last: LastMessage, source: str) -> str:
         return f"velocity_mux has no source {source}: it runs with another robot.yaml"
     if state.active and source_standing(state.standing) is SourceStanding.FOLLOWED:
         return "drives"
-    return f"not followed: {state.reason or source_standing(state.standing).word}"
+    return f"not followed: {state.reason}"
 
 
 def _mux(last: LastMessage) -> Part:

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from canbase_base.frame_socket import BusError
 from canbase_commissioning.session import Echo, Session
 from canbase_config.robot import Bus, Robot
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.runtime.bus_port import BusError, BusPort
+from canbase_driver.runtime.bus_port import BusPort
 from canbase_runtime.terminal import FAILED, WRONG_INPUT, fail, load_config
 
 TURN_S = 0.002

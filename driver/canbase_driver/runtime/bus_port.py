@@ -11,14 +11,13 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import can
 
 from canbase_base.carrier import is_without_carrier
-from canbase_base.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, REMOTE, FrameSocket, open_bus
+from canbase_base.frame_socket import ERROR, ERROR_CLASS, MAX_COB_ID, REMOTE, BusError, FrameSocket, open_bus
 from canbase_config.robot import DRIVER_NODE_ID
 from canbase_driver.cia301.frame import MAX_DATA_BYTES, Frame
 from canbase_driver.cia301.nmt import HEARTBEAT, SYNC
@@ -52,10 +51,6 @@ _ERRORS = (can.CanError, OSError, ValueError)
 """ValueError: from select for a handle whose adapter is gone."""
 
 
-class BusError(Exception):
-    """The bus cannot be opened. The text has the likely reason."""
-
-
 def is_of_a_driver(frame: Frame) -> bool:
     """Whether only a driver sends it: docs/bus.md."""
     return frame.cob_id in (SYNC.cob_id, _OWN_HEARTBEAT)
@@ -69,19 +64,18 @@ def _is_guard_request(can_id: int) -> bool:
 class _Opening(threading.Thread):
     """Opens a bus while the control thread goes on."""
 
-    def __init__(self, open_: Callable[[], FrameSocket], arguments: dict[str, Any]) -> None:
+    def __init__(self, arguments: dict[str, Any]) -> None:
         super().__init__(name="opening", daemon=True)
         self.bus: FrameSocket | None = None
         self.without_carrier = False
         self._arguments = arguments
         self.error: BusError | None = None
-        self._open = open_
         self._lock, self._abandoned = threading.Lock(), False
 
     def run(self) -> None:
         """The thread's body."""
         try:
-            bus = self._open()
+            bus = open_bus(self._arguments)
         except BusError as error:
             self.error = error
             return
@@ -121,7 +115,7 @@ class BusPort:
         self._retry_at = 0.0
         self._carrier_due = -math.inf
         self._opening: _Opening | None = None
-        self._bus: FrameSocket | None = self._open()
+        self._bus: FrameSocket | None = open_bus(self._arguments)
         if is_without_carrier(arguments):
             self._on_bus_off_before()
             self._fail(BUS_OFF)
@@ -275,15 +269,6 @@ class BusPort:
         if self._receive_failures >= RECEIVE_FAILURES:
             self._fail(f"receiving failed {self._receive_failures} times in a row: {error}")
 
-    def _open(self) -> FrameSocket:
-        try:
-            return open_bus(self._arguments)
-        except (*_ERRORS, TypeError, ImportError, NotImplementedError) as error:
-            raise BusError(
-                f"the CAN bus {self._arguments} cannot be opened: {error}. "
-                "Check `bus` in robot.yaml, and that the interface is up (ip -details link show)."
-            ) from error
-
     def _fail(self, problem: str) -> None:
         self.problem = problem
         self.report = replace(self.report, failures=self.report.failures + 1)
@@ -301,7 +286,7 @@ class BusPort:
         if self._opening is None:
             if time.monotonic() < self._retry_at:
                 return
-            self._opening = _Opening(self._open, self._arguments)
+            self._opening = _Opening(self._arguments)
             self._opening.start()
             self._opening.join(OPENS_AT_ONCE_S)
         if self._opening.is_alive():

@@ -11,12 +11,13 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from canbase_base.frame_socket import BusError
 from canbase_base.latch_folder import SUFFIX
 from canbase_base.single_instance import TakenError, bus_name, hold_record, take
 from canbase_config.robot import Robot
 from canbase_config.watchdog import HEARTBEATS_PER_TIMEOUT
 from canbase_driver.cia301.frame import Frame
-from canbase_driver.runtime.bus_port import ANOTHER_DRIVER, BusError, BusPort, is_of_a_driver
+from canbase_driver.runtime.bus_port import ANOTHER_DRIVER, BusPort, is_of_a_driver
 
 TURN_S = 0.01
 """The listening thread waits so long for a frame [s]."""

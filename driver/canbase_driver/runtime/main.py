@@ -20,6 +20,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from canbase_base.frame_socket import BusError
 from canbase_base.latch_file import LatchFile, LatchKeeper
 from canbase_base.output import never_wait
 from canbase_base.sd_notify import Service
@@ -31,7 +32,6 @@ from canbase_driver.ros.node import MotorDriverNode, Publisher
 from canbase_driver.runtime.black_box import Ring
 from canbase_driver.runtime.black_box_about import about
 from canbase_driver.runtime.black_box_writer import BlackBoxWriter
-from canbase_driver.runtime.bus_port import BusError
 from canbase_driver.runtime.claim import Claim
 from canbase_driver.runtime.control_thread import ControlLoop
 from canbase_driver.supervision.lifecycle import Aim

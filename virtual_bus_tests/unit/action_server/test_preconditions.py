@@ -70,7 +70,7 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"driver": replace(GOOD_DRIVER, state=DriverState.LATCHED)}, "latched, not enabled"),
         ({"driver": replace(GOOD_DRIVER, watchdog=WatchdogView.MISSING)}, "watchdog is missing"),
         ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "receives no cmd_vel"),
-        ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick drives"),
+        ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick has the base"),
         ({"mux": replace(GOOD_MUX, held_back="locked: pause holds")}, "holds action back: locked: pause holds"),
         ({"safety": stopped(StopCause.SHUTDOWN)}, "stops the base (shutdown): as the test says"),
         ({"safety": stopped(StopCause.COMMAND_STALE)}, "stops the base (command_stale): as the test says"),
@@ -94,13 +94,16 @@ def test_every_state_of_the_driver_without_power_is_named_with_its_detail(state:
 @pytest.mark.parametrize("view", [view for view in WatchdogView if view is not WatchdogView.OK])
 def test_every_state_of_the_watchdog_but_ok_is_named_with_its_cause(view: WatchdogView) -> None:
     driver = replace(GOOD_DRIVER, watchdog=view, watchdog_cause="lease lost", state=DriverState.LATCHED)
-    expected = f"watchdog is {view.value} (cause lease lost); start or reset it"
+    tripped = view is WatchdogView.TRIPPED
+    remedy = "canbase reset ends it, when its cause is gone" if tripped else "does it run, and is its bus well?"
+    expected = f"watchdog is {view.value} (cause lease lost); {remedy}"
     assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == expected
 
 
 def test_a_watchdog_that_is_missing_has_no_cause() -> None:
     driver = replace(GOOD_DRIVER, watchdog=WatchdogView.MISSING, watchdog_cause="none")
-    assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == "watchdog is missing; start or reset it"
+    expected = "watchdog is missing; does it run, and is its bus well?"
+    assert state_reason(ROBOT, replaced(READY, 0.0, driver=driver), 0.0) == expected
 
 
 def test_of_several_causes_the_one_that_explains_the_others_is_named() -> None:

@@ -114,7 +114,7 @@ def test_a_held_stick_that_is_not_followed_is_told_in_the_headline_and_with_its_
     joystick = MuxSource(name="joystick", active=True, standing=MuxSource.UNARMED, delay_s=math.nan, reason=reason)
     mux = MuxState(active="joystick", not_ready="motor_driver is LATCHED", sources=[joystick])
     snapshot = replace(ALL, mux=LastMessage(mux, 0.1))
-    assert line(snapshot).startswith("joystick is not followed: not armed  |")
+    assert line(snapshot).startswith("joystick is not followed: waiting for zero (motor_driver is LATCHED)  |")
     assert reason in drawn(snapshot)
     assert "The base cannot move: motor_driver is LATCHED" in drawn(snapshot)
 

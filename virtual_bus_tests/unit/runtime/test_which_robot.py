@@ -208,7 +208,7 @@ def test_a_command_names_the_robot_that_it_means(tmp_path: Path, monkeypatch: py
     none = CliRunner().invoke(app, ["print", "urdf"])
     assert (none.exit_code, none.stdout) == (2, "")
     assert none.stderr.startswith(
-        "canbase: no robot is named, runs or is installed here. Name the robot: --config FILE"
+        "canbase: no robot is named, and none of this user runs or is installed here. Name the robot: --config FILE"
     )
 
 
