@@ -1,7 +1,9 @@
-"""The end of ROS in a process that serves. Call it when the base is at standstill: it takes READ_S for each node.
+"""The end of ROS in a process that serves. Call it when the base is at standstill: it takes 2 × READ_S.
 
 A listener that stays, such as the daemon of `ros2`, takes in again what it reads about a node after the process has
-left the network, for as long as it runs (rmw_dds_common, GraphCache). So the endpoints go first.
+left the network, for as long as it runs (rmw_dds_common, GraphCache). So the last thing to read is that the process has
+no node, and it stays on the network until that was read. The endpoints go first: each of them is news of its own, and
+what comes last must not be lost in their burst.
 """
 
 from __future__ import annotations
@@ -24,9 +26,10 @@ def end_ros(*nodes: Node) -> None:
         shutdown.callback(rclpy.try_shutdown)
         for node in nodes:
             _destroy_endpoints(node)
+        time.sleep(READ_S)
         for node in nodes:
-            time.sleep(READ_S)
             node.destroy_node()
+        time.sleep(READ_S)
 
 
 def _destroy_endpoints(node: Node) -> None:
