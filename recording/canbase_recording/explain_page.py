@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 
 from canbase_recording import html_page, page_data
 from canbase_recording.event import Event, Level
-from canbase_recording.explain_text import collapsed, ending, gaps, node_facts, standstill_sentence
+from canbase_recording.explain_text import collapsed, ending, gaps, no_stop, node_facts, standstill_sentence
 from canbase_recording.explanation import Explanation
 from canbase_recording.frame_words import pdo_sources
 from canbase_recording.html_page import Html, data, escaped, row, section, table, tag, terms
@@ -56,8 +56,7 @@ def _stops(told: Explanation) -> Iterator[Html]:
     if told.further_stops:
         yield from _warnings([f"{told.further_stops} further stops are not told."])
     if not told.stories:
-        said = "No drive lost its power in motion, and no part of canbase stopped the base."
-        yield section("stop", "No stop was found", *(tag("p", line) for line in (said, *ending(told))))
+        yield section("stop", "No stop was found", *(tag("p", line) for line in (no_stop(told), *ending(told))))
 
 
 def _stop(number: int, story: Story, told: Explanation) -> Html:
@@ -68,7 +67,7 @@ def _stop(number: int, story: Story, told: Explanation) -> Html:
     facts += [("also seen", f"{cause.value}: {found.text}") for cause, found in story.also]
     return section(
         f"stop{number}",
-        f"Stop {number} of {len(told.stories)}, at {story.scene.reaction_s:.3f} s",
+        f"{story.kind} {number} of {len(told.stories)}, at {story.scene.reaction_s:.3f} s",
         tag("div", story.cause.value, class_="verdict bad"),
         terms(facts),
         *_plot(f"plot{number}", _figure(story), "tall"),

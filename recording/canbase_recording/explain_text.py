@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
+from canbase_config.robot import LSS_REQUEST
 from canbase_recording.event import Event
 from canbase_recording.explanation import Explanation
-from canbase_recording.frame_words import pdo_sources
+from canbase_recording.frame_words import LSS_ANSWER, is_pdo, pdo_sources
 from canbase_recording.node_seen import NodeSeen
 from canbase_recording.recording_facts import RecordingFacts
 from canbase_recording.standstill import WheelStop
@@ -43,13 +44,20 @@ def _lines(facts: RecordingFacts, told: Explanation) -> Iterator[str]:
         yield f"{told.further_stops} further stops are not told; cut the recording to see them"
     if not told.stories:
         yield ""
-        yield "No stop was found: no drive lost its power in motion, and no part of canbase stopped the base."
+        yield f"No stop was found. {no_stop(told)}"
         yield from (f"  {line}" for line in ending(told))
     yield ""
     yield from _network(told)
     if facts.trip is not None:
         yield from ("", facts.trip.sentence) if facts.trip.told is None else ("",)
         yield from ("To see what the watchdog decided:", f"  canbase record replay {facts.trip.path}")
+
+
+def no_stop(told: Explanation) -> str:
+    """What it means that no stop was found."""
+    if any(axis.state for node in told.network.nodes.values() for axis in node.axes.values()):
+        return "No drive lost its power in motion, and no part of canbase stopped the base."
+    return "No part of canbase stopped the base. No statusword (6041h) can be read: what the drives did is not known."
 
 
 def ending(told: Explanation) -> list[str]:
@@ -66,7 +74,7 @@ def ending(told: Explanation) -> list[str]:
 
 
 def _story(number: int, count: int, story: Story) -> Iterator[str]:
-    yield f"Stop {number} of {count}, at {story.scene.reaction_s:.3f} s"
+    yield f"{story.kind} {number} of {count}, at {story.scene.reaction_s:.3f} s"
     yield f"  first cause:  {story.cause.value}"
     yield f"                {story.found.text}"
     if story.caught_by:
@@ -143,17 +151,24 @@ def gaps(told: Explanation) -> list[str]:
         for node_id in sorted({drive.node_id for drive in drives} - sent)
     ]
     unknown = sorted(told.network.unknown_pdos)
-    if unknown:
-        shown = ", ".join(f"{cob_id:03X}h ({length} bytes)" for cob_id, length in unknown[:8])
-        more = f" and {len(unknown) - 8} more" if len(unknown) > 8 else ""
+    if pdos := [each for each in unknown if is_pdo(each[0])]:
         why = "they do not fit robot.yaml" if told.robot else "give --config robot.yaml, or record from the boot on"
-        lines.append(f"PDOs {shown}{more}: contents not known; {why}")
+        lines.append(f"PDOs {_lengths(pdos)}: contents not known; {why}")
+    if others := [each for each in unknown if not is_pdo(each[0]) and each[0] not in (LSS_ANSWER, LSS_REQUEST)]:
+        lines.append(f"frames {_lengths(others)}: no service of CiA 301")
     return lines
+
+
+def _lengths(frames: Sequence[tuple[int, int]]) -> str:
+    shown = ", ".join(f"{cob_id:03X}h ({length} bytes)" for cob_id, length in frames[:8])
+    return shown + (f" and {len(frames) - 8} more" if len(frames) > 8 else "")
 
 
 def node_facts(told: Explanation, node: NodeSeen) -> list[str]:
     """What is known of one node, a few words each."""
     facts = [node.nmt.text if node.nmt is not None else "NMT state not seen"]
+    if node.ordered:
+        facts[0] += f" before NMT {node.ordered}"
     facts += [
         f"{axis.state.text}{f' (axis {number})' if number else ''}" for number, axis in node.axes.items() if axis.state
     ]

@@ -153,7 +153,7 @@ class Decoder:
             return FrameWords(Kind.HEARTBEAT, node_id, _heartbeat(data))
         if function in (SDO_TO_CLIENT, SDO_TO_SERVER):
             return FrameWords(Kind.SDO, node_id, self._sdo(node_id, data, by_client=function == SDO_TO_SERVER))
-        if function in TPDO or function in RPDO:
+        if is_pdo(cob_id):
             return self._pdo(cob_id, data)
         return FrameWords(Kind.OTHER, node_id, f"no service of CiA 301 has {cob_id:03X}h")
 
@@ -287,6 +287,11 @@ def _watchdog(cob_id: int, data: bytes) -> FrameWords | None:
     rung = f", {RUNGS[state.rung]}" if 0 < state.rung < len(RUNGS) else ""
     answer = f", reset {state.answered}: {ANSWERS.get(state.answer, 'no answer')}" if state.answered else ""
     return FrameWords(Kind.WATCHDOG, WATCHDOG_NODE_ID, f"{said}{rung}, {lease}{answer}")
+
+
+def is_pdo(cob_id: int) -> bool:
+    """Of a PDO in the predefined connection set. CiA 301 lets no PDO have 101h to 180h and 780h to 7FFh."""
+    return cob_id & 0x780 in (*TPDO, *RPDO)
 
 
 def _pdo_name(cob_id: int) -> str:

@@ -30,10 +30,10 @@ from canbase_recording.axis_events import HALTED_S, OnWord, on_controlword, on_s
 from canbase_recording.beat import Beat
 from canbase_recording.entry import FrameKind, RecordedFrame
 from canbase_recording.event import Event, EventKind, Level
-from canbase_recording.frame_words import QUICK_STOP_COB_ID, SYNC, Decoder, nmt_state, nmt_text
+from canbase_recording.frame_words import NMT_COMMANDS, QUICK_STOP_COB_ID, SYNC, Decoder, is_pdo, nmt_state, nmt_text
 from canbase_recording.load_series import LoadSeries
 from canbase_recording.node_seen import NodeSeen
-from canbase_recording.pdo_layouts import PdoLayouts
+from canbase_recording.pdo_layouts import DEVICE_TYPE, PdoLayouts, Source
 from canbase_recording.sdo_words import SdoChannels, SdoDone
 
 LOOK_S: Final = 0.02
@@ -83,6 +83,8 @@ class Network:
             )
         else:
             self.kinds["remote and 29-bit frames"] += 1
+            if kind is FrameKind.REMOTE and cob_id & 0x780 == HEARTBEAT and (polled := self.nodes.get(cob_id & 0x7F)):
+                polled.polled_s = at_s
         return [*missing, *found] if missing else found
 
     def end(self, at_s: float) -> Sequence[Event]:
@@ -141,6 +143,8 @@ class Network:
         if len(data) != 2:
             return NONE
         hit = [node for node in self.nodes.values() if data[1] in (0, node.node_id)]
+        for node in hit:
+            node.ordered = NMT_COMMANDS.get(data[0], node.ordered)
         if data[0] in _LADDER_COMMANDS and self._watchdog_stops(at_s):
             return [
                 Event(at_s, EventKind.NMT_COMMAND, Level.INFO, "watchdog", f"its ladder: {nmt_text(data)}", data[1])
@@ -163,6 +167,7 @@ class Network:
             return NONE
         node = self._seen(node_id, at_s)
         who, state, before = self._decoder.who(node_id), nmt_state(data[0]), node.nmt
+        node.ordered = ""
         if data[0] == NmtState.INITIALISING:
             node.boot_ups += 1
             node.nmt = NmtState.PRE_OPERATIONAL
@@ -229,8 +234,9 @@ class Network:
             return NONE
         value = int.from_bytes(done.data, "little")
         index, sub, node_id = done.at.index, done.at.sub, done.node_id
-        if 0x1400 <= index < 0x1C00:
+        if index == DEVICE_TYPE or 0x1400 <= index < 0x1C00:
             self._layouts.on_object(node_id, index, sub, value)
+            self._drop_refuted(node_id)
         elif index == 0x1018 and sub:
             self._known(node_id, at_s).identity[sub] = value
         elif index == STATUSWORD and not sub and len(done.data) == 2 and not done.is_write:
@@ -240,15 +246,17 @@ class Network:
         return NONE
 
     def _on_pdo(self, at_s: float, cob_id: int, data: bytes) -> Sequence[Event]:
-        self.kinds["PDO"] += 1
+        self.kinds["PDO" if is_pdo(cob_id) else "other"] += 1
         if self.watchdog is not None and cob_id in (COUNTERS_COB_ID, RESET_COB_ID):
             return NONE
         layout = self._layouts.of(cob_id, len(data))
         if layout is None or not layout.fits(len(data)):
             if len(self.unknown_pdos) < MOST_UNKNOWN or (cob_id, len(data)) in self.unknown_pdos:
                 self.unknown_pdos[cob_id, len(data)] += 1
+            self._drop_refuted(cob_id & 0x7F)
             return NONE
         node = self._seen(layout.node_id, at_s) if layout.name[0] == "T" else self._known(layout.node_id, at_s)
+        node.is_assumed = node.is_assumed or layout.source is Source.CIA_402
         is_watchdog = self.watchdog is not None and cob_id & 0x780 == QUICK_STOP_COB_ID
         on_command = on_watchdog_word if is_watchdog else on_controlword
         events: Sequence[Event] = NONE
@@ -263,6 +271,13 @@ class Network:
                 continue
             events = [*events, *found] if found else events
         return events
+
+    def _drop_refuted(self, node_id: int) -> None:
+        """What was read by an assumed mapping that the node turns out not to have is no state of a drive."""
+        node = self.nodes.get(node_id)
+        if node is not None and node.is_assumed and node_id in self._layouts.refuted:
+            node.axes.clear()
+            node.is_assumed = False
 
     def _on_word(self, at_s: float, node: NodeSeen, number: int, word: int, on_word: OnWord) -> Sequence[Event]:
         event = on_word(at_s, node.axis(number), self._decoder.who(node.node_id, number), node.node_id, word)
@@ -297,15 +312,14 @@ class Network:
             events.append(Event(now_s, EventKind.SYNC_LOST, level, "bus", _lost("SYNC", self.sync)))
         for node in self.nodes.values():
             beat = node.heartbeat
-            if not beat.is_lost and beat.is_missing(now_s):
+            if not beat.is_lost and beat.is_missing(now_s) and node.owes_heartbeat:
                 beat.is_lost = True
                 is_ours = node.node_id in (DRIVER_NODE_ID, WATCHDOG_NODE_ID)
                 was_up = self.is_enabled if is_ours else node.nmt is NmtState.OPERATIONAL
                 who = self._decoder.who(node.node_id)
                 level = Level.ALARM if was_up else Level.WARNING
-                events.append(
-                    Event(now_s, EventKind.HEARTBEAT_LOST, level, who, _lost("heartbeat", beat), node.node_id)
-                )
+                text = _lost("answer to node guarding" if node.guarded else "heartbeat", beat)
+                events.append(Event(now_s, EventKind.HEARTBEAT_LOST, level, who, text, node.node_id))
         return events
 
 

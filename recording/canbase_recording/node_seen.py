@@ -60,6 +60,10 @@ class NodeSeen:
     first_s: float = math.nan
     last_s: float = math.nan
     nmt: NmtState | None = None
+    ordered: str = ""
+    """The NMT command that it got after it last reported its state; empty: none."""
+    polled_s: float = -math.inf
+    """When a remote frame last asked for its state (node guarding)."""
     heartbeat: Beat = field(default_factory=Beat)
     guarded: bool = False
     """It answers node guarding."""
@@ -67,12 +71,19 @@ class NodeSeen:
     emergencies: Counter[int] = field(default_factory=Counter)
     aborts: Counter[tuple[Address, int]] = field(default_factory=Counter)
     axes: dict[int, AxisSeen] = field(default_factory=dict)
+    is_assumed: bool = False
+    """Something of its axes was read by the default mapping of CiA 402, which is assumed."""
     identity: dict[int, int] = field(default_factory=dict)
     """1018h by sub-index, where the recording shows it being read."""
 
     def axis(self, number: int) -> AxisSeen:
         """One of its axes, from now on."""
         return self.axes.setdefault(number, AxisSeen())
+
+    @property
+    def owes_heartbeat(self) -> bool:
+        """It sends by itself, or the last request of a recording that shows them is not answered."""
+        return not self.guarded or self.polled_s > self.heartbeat.last_s or math.isinf(self.polled_s)
 
     @property
     def is_enabled(self) -> bool:

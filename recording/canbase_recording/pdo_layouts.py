@@ -1,12 +1,14 @@
 """What each PDO contains, and how that is known. Pure; it guesses nothing without saying so.
 
 In this order: robot.yaml; the mapping that the recording shows being written or read by SDO; canbase's own layout, in a
-recording with canbase's watchdog; the default mapping of CiA 402-2, where the length of the frame fits it.
+recording with canbase's watchdog; the default mapping of CiA 402-2, where the length of the frame fits it and nothing
+refutes it: a device type (1000h) of another profile, or a TPDO of the same node with another length. A robot.yaml names
+all drives: of other nodes nothing is assumed then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Final
@@ -34,6 +36,9 @@ MOST_MAPPED: Final = 64
 MOST_LEARNED: Final = 2_000
 """PDOs whose settings are remembered: four of each node are about a thousand."""
 OFF: Final = 1 << 31
+DEVICE_TYPE: Final = 0x1000
+DRIVES: Final = 402
+"""The profile in the lower half of a device type: drives and motion control."""
 TARGET_POSITION: Final = 0x607A
 SIGNED: Final = frozenset(
     (0x6007, MODE, MODE_DISPLAY, POSITION_ACTUAL, VELOCITY_ACTUAL, TARGET_VELOCITY, TORQUE_ACTUAL, CURRENT_ACTUAL,
@@ -113,11 +118,12 @@ class PdoLayouts:
         self._robot = robot
         self._known: dict[int, list[PdoLayout]] = {}
         self._learned: dict[tuple[int, bool, int], _Learned] = {}
-        self._is_canbase = robot is not None
-        self._assumed: dict[tuple[int, int], PdoLayout | None] = {}
+        self._is_canbase = False
         self._by_length: dict[tuple[int, int], PdoLayout | None] = {}
+        self.refuted: set[int] = set()
+        """Nodes that do not have the default mapping of CiA 402: nothing is assumed of them."""
         self._own: set[int] = set()
-        """Nodes whose layout robot.yaml gives: what else they send is not guessed."""
+        """Nodes whose layout robot.yaml gives."""
         if robot is not None:
             self._take_robot(robot)
 
@@ -132,11 +138,13 @@ class PdoLayouts:
         """The recording has frames of canbase's watchdog."""
         if not self._is_canbase:
             self._is_canbase = True
-            self._assumed.clear()
+            self.refuted.clear()
             self._by_length.clear()
 
     def on_object(self, node_id: int, index: int, sub: int, value: int) -> None:
         """An SDO transfer has written or read this value, and the node confirmed it."""
+        if index == DEVICE_TYPE and value & 0xFFFF != DRIVES and not self._is_canbase:
+            self._refute(node_id)
         where = next((each for each in _PLACES if index in each[0]), None)
         if where is None:
             return
@@ -162,7 +170,7 @@ class PdoLayouts:
         for known in self._known.get(cob_id, ()):
             if known.fits(length):
                 return known
-        if cob_id in self._known or cob_id & 0x7F in self._own:
+        if cob_id in self._known:
             return None
         return self._assume(cob_id, length)
 
@@ -185,11 +193,11 @@ class PdoLayouts:
         name = f"{'RPDO' if is_rpdo else 'TPDO'}{number}"
         entries = [learned.entries[sub + 1] for sub in range(count)]
         self._known[cob_id] = [_layout(name, node_id, entries, Source.SDO, exact=not is_rpdo)]
-        self._by_length.clear()
+        self._forget(lambda each: each == cob_id)
 
     def _assume(self, cob_id: int, length: int) -> PdoLayout | None:
         node_id, function = cob_id & 0x7F, cob_id & 0x780
-        if not node_id or node_id in (DRIVER_NODE_ID, WATCHDOG_NODE_ID):
+        if self._robot is not None or node_id in (0, DRIVER_NODE_ID, WATCHDOG_NODE_ID) or node_id in self.refuted:
             return None
         table = _CANBASE if self._is_canbase else _DEFAULT
         source = Source.CANBASE if self._is_canbase else Source.CIA_402
@@ -197,7 +205,17 @@ class PdoLayouts:
             entries = [index << 16 | bits for index, bits in objects]
             if function == at and 8 * length == sum(entry & 0xFF for entry in entries):
                 return _layout(name, node_id, entries, source)
+        if function in TPDO and not self._is_canbase:
+            self._refute(node_id)
         return None
+
+    def _refute(self, node_id: int) -> None:
+        self.refuted.add(node_id)
+        self._forget(lambda cob_id: cob_id & 0x7F == node_id)
+
+    def _forget(self, is_meant: Callable[[int], bool]) -> None:
+        """What was found for these COB-IDs is looked up again."""
+        self._by_length = {key: found for key, found in self._by_length.items() if not is_meant(key[0])}
 
 
 _PLACES: Final = (

@@ -113,6 +113,11 @@ class Story:
     scene: Scene
 
     @property
+    def kind(self) -> str:
+        """Stop; or Alarm: the recording has neither a drive nor a part that acts: nothing shows that anything stopped."""
+        return "Stop" if self.caught_by or self.scene.drive_nodes else "Alarm"
+
+    @property
     def advice(self) -> str:
         """What to look at first."""
         return ADVICE[self.cause]

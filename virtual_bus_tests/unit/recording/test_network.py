@@ -168,6 +168,87 @@ def test_node_guarding_is_no_heartbeat() -> None:
     assert "guarded each 100 ms" in facts_of(told, 5)
 
 
+def test_a_node_that_is_no_longer_polled_owes_no_answer_and_one_that_does_not_answer_is_missing() -> None:
+    answers = [RecordedFrame(0.1 * i + 0.001, 0x705, bytes([0x05 | 0x80 * (i % 2)])) for i in range(20)]
+    polls = [RecordedFrame(0.1 * i, 0x705, b"", kind=FrameKind.REMOTE) for i in range(25)]
+    later = [RecordedFrame(3.0 + 0.1 * i, 0x080, b"") for i in range(9)]
+    asked = sorted([*answers, *polls[:20]], key=lambda frame: frame.at_s)
+    assert explain([*asked, *later]).stories == []
+    assert "MISSING" not in facts_of(explain([*asked, *later]), 5)
+    told = explain([*asked, *polls[20:], *later])
+    assert "MISSING since 1.901 s" in facts_of(told, 5)
+    assert told.events[-1].text == "no answer to node guarding since 1.901 s, its period was 100 ms"
+
+
+def a_machine_without_drives() -> list[RecordedFrame]:
+    """Node 5 has another profile than 402; what its PDOs contain is its own matter. Its heartbeat ends at 3.9 s.
+
+    The last frames are those of an application, with identifiers that CiA 301 gives to no PDO, and of LSS.
+    """
+    frames = [RecordedFrame(0.1 * i, 0x705, b"\x05") for i in range(40)]
+    frames += [RecordedFrame(0.05 + 0.1 * i, 0x385, bytes.fromhex("2100ac000100")) for i in range(60)]
+    frames += [RecordedFrame(6.1, cob_id, bytes(8)) for cob_id in (0x10A, 0x7EA, 0x7E5, 0x7E4)]
+    return sorted(frames, key=lambda frame: frame.at_s)
+
+
+REFUTATIONS = [
+    sdo(5, "4000100000000000", "430010004802d100", 2.0),  # device type 0248h: profile 584
+    [RecordedFrame(2.0, 0x185, bytes(8))],  # CiA 402's TPDO1 has 2 bytes
+]
+
+
+@pytest.mark.parametrize("refutation", REFUTATIONS)
+def test_what_is_no_drive_has_no_state_of_a_drive(refutation: list[RecordedFrame]) -> None:
+    frames = a_machine_without_drives()
+    assert "operational, ready to switch on" in facts_of(explain(frames), 5)
+    assert "385h: assumed" in "\n".join(text_lines(FACTS, explain(frames)))
+    told = explain(sorted([*frames, *refutation], key=lambda frame: frame.at_s))
+    text = "\n".join(text_lines(FACTS, told))
+    assert "switch on" not in facts_of(told, 5)
+    assert "assumed" not in text
+    assert "385h (6 bytes)" in text
+    assert "Alarm 1 of 1, at 4.2" in text
+    assert "standstill:   unknown: the recording has no position (6064h)" in text
+
+
+def test_robot_yaml_names_all_drives_other_nodes_are_none() -> None:
+    """Six bytes fit canbase's layout of a generic drive, and canbase's watchdog is on this bus."""
+    watchdog = RecordedFrame(0.0, 0x1FE, b"\x02\x03\x00\x01\x05\x00\x00\x00")
+    frames = [watchdog, RecordedFrame(0.1, 0x185, struct.pack("<Hi", 0x21, 0))]
+    told = explain(frames, load_robot(sample("bench")).robot)
+    assert 5 not in told.network.nodes
+    assert "PDOs 185h (6 bytes): contents not known; they do not fit robot.yaml" in gaps(told)
+
+
+def test_a_device_type_of_cia_402_refutes_nothing() -> None:
+    told = explain([*sdo(5, "4000100000000000", "4300100092010200", 0.0), *a_machine_without_drives()])
+    assert "ready to switch on" in facts_of(told, 5)
+
+
+def test_frames_that_cannot_be_pdos_are_not_called_so() -> None:
+    assert gaps(explain(a_machine_without_drives())) == ["frames 10Ah (8 bytes), 7EAh (8 bytes): no service of CiA 301"]
+
+
+def test_an_assumption_is_marked_though_another_mapping_is_learned_later() -> None:
+    """Node 3 has the default mapping; node 4 is configured after its last frame."""
+    frames = [RecordedFrame(0.01, 0x183, b"\x37\x02"), *(each for each in boot() if isinstance(each, RecordedFrame))]
+    text = "\n".join(text_lines(FACTS, explain(frames)))
+    assert "node 3: pre-operational before NMT start, operation enabled" in text
+    assert "PDOs 183h: assumed: default mapping of CiA 402" in text
+
+
+def test_without_a_statusword_no_stop_found_does_not_mean_that_no_drive_stopped() -> None:
+    text = "\n".join(text_lines(FACTS, explain([RecordedFrame(0.1 * i, 0x705, b"\x05") for i in range(9)])))
+    assert "No statusword (6041h) can be read: what the drives did is not known." in text
+    assert "no drive lost" not in text.lower()
+
+
+def test_a_state_that_was_reported_before_an_nmt_command_is_not_the_state_now() -> None:
+    frames = [RecordedFrame(0.0, 0x705, b"\0"), RecordedFrame(0.1, 0x000, b"\x01\x00")]
+    assert facts_of(explain(frames), 5) == "pre-operational before NMT start, 1 boot-ups"
+    assert facts_of(explain([*frames, RecordedFrame(0.2, 0x705, b"\x05")]), 5) == "operational, 1 boot-ups"
+
+
 def test_error_frames_are_counted() -> None:
     told = explain([RecordedFrame(0.1 * i, 0x20, bytes(8), kind=FrameKind.ERROR) for i in range(9)])
     assert told.network.error_frames == 9
