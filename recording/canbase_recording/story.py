@@ -114,7 +114,7 @@ class Story:
 
     @property
     def kind(self) -> str:
-        """Stop; or Alarm: the recording has neither a drive nor a part that acts: nothing shows that anything stopped."""
+        """Stop; or Alarm: neither a drive nor a part that acts is in the recording; nothing shows a stop."""
         return "Stop" if self.caught_by or self.scene.drive_nodes else "Alarm"
 
     @property
