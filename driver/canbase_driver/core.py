@@ -310,6 +310,14 @@ class DriverCore:
             self._reset.end(outcome)
         return frames
 
+    def _found_clue(self, liar: int) -> str:
+        """What the driver knows about a trip of the watchdog. `liar`: whose sensors that found faulty; 0: nobody's."""
+        clue = self._drives.contradiction(liar) or self._drives.unshown_mode(liar)
+        if clue or self.state is not DriverState.ENABLED:
+            return clue  # by now the statuswords speak of the stop
+        node_id = self._watchdog.not_moving_as_ordered
+        return "" if node_id is None else self._drives.not_following(node_id)
+
     def _heartbeat(self, now_s: float) -> list[Frame]:
         if now_s - self._heartbeat_at < self._heartbeat_s or self._readiness.released:
             return []
@@ -327,7 +335,7 @@ class DriverCore:
             drives.doubt(liar, f"reports implausible values (watchdog: {watchdog_detail})")
         if watchdog is not WatchdogView.TRIPPED:
             self._clue = ""
-        elif clue := self._clue or drives.contradiction(liar) or drives.unshown_mode(liar):
+        elif clue := self._clue or self._found_clue(liar):
             self._clue, watchdog_detail = clue, f"{watchdog_detail}; {clue}"
         measured_mps = abs(drives.fastest().velocity_mps)
         left_mps, right_mps = wheel_speeds(self._motion.twist, self._track_m)

@@ -143,6 +143,7 @@ OF_THE_SETPOINTS = (
     ),
     BaseSign("left_right", lambda view: f"left and right wheels are ordered {view.skew}" if view.skew else ""),
 )
+AGAINST = ", the other way: see `direction` in robot.yaml, motor phases, encoder"
 
 
 def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
@@ -152,6 +153,7 @@ def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict
             detail = (
                 f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, "
                 f"its setpoints allow {feedback.low_mps:.3f} to {feedback.high_mps:.3f} m/s"
+                + (AGAINST if axis.velocity_mps * axis.setpoint_mps < 0.0 else "")
             )
             return Verdict(TripCause.MOTION_OUTSIDE, axis.drive.node_id, detail)
     return FINE
@@ -253,7 +255,7 @@ def _unseen(axis: Axis, config: WatchdogConfig) -> str:
         f"{max(evidence.unseen_s, evidence.both_s):.3f} s and {evidence.both_m:.3f} m of its orders (allowed "
         f"{config.motion_missing_s:.3f} s and {config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that "
         f"way: watchdog.motion_missing_m); it reports "
-        f"{axis.velocity_mps:.3f} m/s: see encoder, motor, wheel"
+        f"{axis.velocity_mps:.3f} m/s: see encoder, motor, brake, wheel"
     )
 
 
@@ -262,7 +264,8 @@ def _vain(axis: Axis, config: WatchdogConfig) -> str:
         return ""
     return (
         f"is pushed with {_torque(axis)} and shows no motion for {axis.torque.vain_s:.3f} s (allowed "
-        f"{config.motion_missing_s:.3f} s), ordered {axis.evidence.setpoint_mps:.3f} m/s: see encoder, motor, wheel"
+        f"{config.motion_missing_s:.3f} s), ordered {axis.evidence.setpoint_mps:.3f} m/s: "
+        "see encoder, motor, brake, wheel"
     )
 
 

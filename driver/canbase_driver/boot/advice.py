@@ -177,5 +177,8 @@ def without(step: Write, *, lacks_it: bool = False) -> str:
     by_hand = f"set {in_digits(step)} with the manufacturer's tool"
     cure = "canbase setup commission shows whether it stops in another way" if lacks_it else by_hand
     if index in FOR_SELF_STOP:
-        return f"; so {meaning}: {cure}, else only a wired STO does"
+        longer = (
+            "" if lacks_it or index != 0x1016 else ", or `timeouts.drive_heartbeat_s` in robot.yaml to what it takes"
+        )
+        return f"; so {meaning}: {cure}{longer}, else only a wired STO does"
     return f"; so {meaning}" if lacks_it else f"; so {meaning}: {cure}"

@@ -54,6 +54,8 @@ NUMBERS = ("vendor_id", "product_code", "revision", "serial")
 """1018h:1 to 1018h:4."""
 
 POLL_S = 0.02
+BUSY_S = 2.0
+"""A boot waits as long, all its writes together, for a drive whose state forbids them (0800 0022h) [s]."""
 STANDING_POLLS = 5
 """A drive that stays in quick stop active is at standstill when this many polls in a row find it slow."""
 _RESETS = {"communication": NmtCommand.RESET_COMMUNICATION, "node": NmtCommand.RESET_NODE}
@@ -94,14 +96,14 @@ def boot(
     The last steps read the units: an answer to a write that was requested twice comes before theirs. The steps end with
     the report, or raise BootError when the node cannot be made ready.
     """
-    return _explained(_twice(_Boot(node_id, drives, robot, learned, identify).run()))
+    return _explained(_patient(_Boot(node_id, drives, robot, learned, identify).run()))
 
 
-def _twice(steps: Steps[BootReport]) -> Steps[BootReport]:
-    """A write that the state of the drive forbids is tried once more: some drives are busy for a moment."""
+def _patient(steps: Steps[BootReport]) -> Steps[BootReport]:
+    """A write that the state of the drive forbids is tried again, once at least: some drives are busy after a reset."""
     answer: Any = None
     refusal: SdoError | None = None
-    repeated: set[Write] = set()
+    pauses_left = round(BUSY_S / POLL_S)
     while True:
         try:
             step = steps.send(answer) if refusal is None else steps.throw(refusal)
@@ -113,14 +115,18 @@ def _twice(steps: Steps[BootReport]) -> Steps[BootReport]:
             answer = yield step
         except SdoError as error:
             refusal = error
-        is_of_state = isinstance(refusal, SdoAborted) and refusal.code == DEVICE_STATE
-        if is_of_state and isinstance(step, Write) and step not in repeated:
-            repeated.add(step)
+        is_repeated = False
+        while isinstance(step, Write) and _is_of_state(refusal) and (pauses_left > 0 or not is_repeated):
+            is_repeated, pauses_left = True, pauses_left - 1
             yield Pause(POLL_S, f"its state to allow {step}")
             try:
                 answer, refusal = (yield step), None
             except SdoError as error:
                 refusal = error
+
+
+def _is_of_state(refusal: SdoError | None) -> bool:
+    return isinstance(refusal, SdoAborted) and refusal.code == DEVICE_STATE
 
 
 def _explained(steps: Steps[BootReport]) -> Steps[BootReport]:

@@ -165,10 +165,11 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         key = STOPPING_LIMITS.get(index)
         if kept is None or key is None:
             continue
-        needed, has = getattr(robot.limits, key), kept.mps2
+        needed, has = _needed_mps2(robot)[index], kept.mps2
         if has is None:
             value = AxisUnits(drive, robot.base).acceleration_raw(needed)
-            least = f"{needed:g} m/s² (limits.{key}), a value of {value}{kept.what}"
+            where = ", in a curve" if needed > getattr(robot.limits, key) else ""
+            least = f"{needed:g} m/s² (limits.{key}{where}), a value of {value}{kept.what}"
             node.notes.append(
                 f"how hard {drive.joint} brakes is unknown: it must be at least {least}; "
                 "set it with the manufacturer's tool"
@@ -177,11 +178,28 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         if has >= KEPT_SHARE * needed:
             continue
         problem = f"{kept.what}: {drive.joint} brakes with {has:.3g} m/s² by it"
-        slower = f"set `limits.{key}: {math.floor(1000.0 * has) / 1000.0:g}` in robot.yaml, where it is {needed:g}"
-        if has < (ordinary := robot.limits.deceleration_mps2) < needed:
-            slower += f", and `limits.deceleration_mps2` to no more, where it is {ordinary:g}"
-        hint = f"Set the object with the manufacturer's tool, or {slower}"
+        hint = f"Set the object with the manufacturer's tool, or {_slower(robot, key, has)}"
         raise BootError(node.node_id, problem, hint)
+
+
+def _slower(robot: Robot, key: str, has_mps2: float) -> str:
+    """Which limits of robot.yaml fit a wheel that brakes with `has_mps2`. In a curve both decelerations add up."""
+    limits = robot.limits
+    if key == "deceleration_mps2":
+        share = has_mps2 / _needed_mps2(robot)[PROFILE_DECELERATION]
+        straight, turning = limits.deceleration_mps2, limits.angular_deceleration_radps2
+        return (
+            f"set `limits.deceleration_mps2: {_floor(share * straight):g}` and `limits.angular_deceleration_radps2: "
+            f"{_floor(share * turning):g}` in robot.yaml, where they are {straight:g} and {turning:g}"
+        )
+    text = f"set `limits.{key}: {_floor(has_mps2):g}` in robot.yaml, where it is {getattr(limits, key):g}"
+    if has_mps2 < (ordinary := limits.deceleration_mps2) < getattr(limits, key):
+        text += f", and `limits.deceleration_mps2` to no more, where it is {ordinary:g}"
+    return text
+
+
+def _floor(value: float) -> float:
+    return math.floor(1000.0 * value) / 1000.0
 
 
 def _set_ramp(node: NodeAccess, drive: Drive, robot: Robot, index: int, mps2: float) -> Steps[KeptRamp | None]:
@@ -218,17 +236,19 @@ def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
     raise BootError(node.node_id, problem, hint)
 
 
+def _needed_mps2(robot: Robot) -> dict[int, float]:
+    """What a wheel needs at most: in a curve the ramps of both speeds add up."""
+    limits, arm_m = robot.limits, robot.base.track_m / 2
+    return {
+        PROFILE_ACCELERATION: limits.acceleration_mps2 + limits.angular_acceleration_radps2 * arm_m,
+        PROFILE_DECELERATION: limits.deceleration_mps2 + limits.angular_deceleration_radps2 * arm_m,
+        QUICK_STOP_DECELERATION: limits.emergency_deceleration_mps2,
+    }
+
+
 def _ramps_mps2(robot: Robot) -> dict[int, float]:
     """The driver shapes the speed; the drive's own ramps bound a step, and must never lag behind in a curve."""
-    limits, arm_m = robot.limits, robot.base.track_m / 2
-    faster = limits.acceleration_mps2 + limits.angular_acceleration_radps2 * arm_m
-    slower = limits.deceleration_mps2 + limits.angular_deceleration_radps2 * arm_m
-    hardest = limits.emergency_deceleration_mps2
-    return {
-        PROFILE_ACCELERATION: max(faster, hardest),
-        PROFILE_DECELERATION: max(slower, hardest),
-        QUICK_STOP_DECELERATION: hardest,
-    }
+    return {index: max(mps2, robot.limits.emergency_deceleration_mps2) for index, mps2 in _needed_mps2(robot).items()}
 
 
 def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
@@ -266,9 +286,12 @@ def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[
     """Raises BootError: it may take a longer period, which timeouts.drive_heartbeat_s allows."""
     problem = f"it takes no heartbeat period of at most {longest_ms} ms ({refusal})"
     for period_ms in HEARTBEAT_PERIODS_MS:
-        if period_ms > longest_ms and (yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))):
-            key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * period_ms / 1000:g}`"
-            raise BootError(node.node_id, problem, f"It takes {period_ms} ms: set {key} in robot.yaml")
+        if period_ms > longest_ms:
+            yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))
+            has_ms = (yield from node.read_if_present(HEARTBEAT_PRODUCER)) or 0
+            if longest_ms < has_ms <= HEARTBEAT_PERIODS_MS[-1]:
+                key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * has_ms / 1000:g}`"
+                raise BootError(node.node_id, problem, f"It has {has_ms} ms then: set {key} in robot.yaml")
     tool = f"set 1017h:0 to 1 to {longest_ms} with the manufacturer's tool"
     none = (
         f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {tool}, or, {GUARDING_ALONE}; without either it cannot be used"

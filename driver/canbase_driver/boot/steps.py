@@ -170,10 +170,14 @@ class NodeAccess:
                 return mode is not None
             if polls_left:
                 yield Pause(MODE_POLL_S, f"mode {step.value!r} in {shown_at}, which shows {mode}")
-        self.unshown_mode = (
-            f"{shown_at} shows mode {mode}, {step.value!r} was set; it may take power to change, or time: with "
-            "`options.mode_display: yes` in its drive profile the boot waits for it"
+        waited_s = (self.mode_polls - 1) * MODE_POLL_S
+        why = (
+            f" {waited_s:.0f} s ago: look what else sets it, the manufacturer's tool or an input"
+            if waited_s
+            else "; it may take power to change, or time: with `options.mode_display: yes` in its drive profile the "
+            "boot waits for it"
         )
+        self.unshown_mode = f"{shown_at} shows mode {mode}, {step.value!r} was set{why}"
         self.notes.append(self.unshown_mode)
         return False
 

@@ -481,7 +481,8 @@ class CanopenNode:
             self.boot_error = ""
             self._go(Presence.READY, now_s)
         elif now_s - self._since_s > START_TIMEOUT_S:
-            self.boot_error = f"within {START_TIMEOUT_S:.1f} s of NMT start it sent {self._not_started(now_s)}"
+            waited_s = HEARTBEAT_S if now_s - self._since_s > HEARTBEAT_S else START_TIMEOUT_S
+            self.boot_error = f"within {waited_s:.1f} s of NMT start it sent {self._not_started(now_s)}"
             if fed and (self._awaits_guard or (self.nmt_state is None and now_s - self._since_s <= HEARTBEAT_S)):
                 return  # it sends feedback: another boot would bring no watchdog that sends requests
             self.lose(f"could not be started: {self.boot_error}", now_s)
@@ -505,7 +506,7 @@ class CanopenNode:
             lacking.append(NO_ANSWER if self._guarded is not None else NO_HEARTBEAT)
         elif self.nmt_state is not NmtState.OPERATIONAL:
             kind = "a heartbeat" if self._guarded is None else "an answer to node guarding"
-            lacking.append(f"{kind} that says {self.nmt_state.text}, not operational")
+            lacking = [f"{kind} that says {self.nmt_state.text}, not operational: it has not taken NMT start (000h)"]
         elif self._guarded is not None and not self._guarded.alternates:
             lacking.append(NO_TOGGLE)
         notes = self.report.notes if self.report else ()

@@ -20,6 +20,16 @@ from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.canopen_node import CanopenNode, Presence
 from canbase_driver.drives.drive_snapshot import DriveSnapshot
 
+LOCAL = "it is in local mode and ignores the controlword (statusword bit 9)"
+LIMITED = "a limit in the drive is active (statusword bit 11): 607Fh, 6080h, its current limit, or the load"
+WHY_DISABLED = {
+    DriveState.SWITCH_ON_DISABLED: " (STO, main voltage?)",
+    DriveState.READY_TO_SWITCH_ON: " (STO, main voltage?)",
+    DriveState.SWITCHED_ON: " (an input that enables it?)",
+    DriveState.QUICK_STOP_ACTIVE: " (a quick stop of its own: a limit switch or another input?)",
+}
+"""Where to look when a drive that shall have power has this state."""
+
 
 class Drives:
     """Nodes by node id, axes in the order of robot.yaml."""
@@ -178,6 +188,19 @@ class Drives:
         """What the boot of this node noted about a mode that 6061h did not show; empty: nothing."""
         return _first(node.unshown_mode for node in self.nodes if node.node_id == node_id)
 
+    def not_following(self, node_id: int) -> str:
+        """Why an axis of this node (0: of any) may not follow, by its statusword and EMCY; empty: it says nothing."""
+        for node, axis in self._with_node:
+            if node_id not in (0, node.node_id):
+                continue
+            if not axis.statusword & REMOTE:
+                return f"{_place(axis)}: {LOCAL}"
+            if axis.statusword & INTERNAL_LIMIT:
+                return f"{_place(axis)}: {LIMITED}"
+            if code := node.emcy_text():
+                return f"{_place(axis)} reports {code}"
+        return ""
+
     def doubt(self, node_id: int, why: str) -> None:
         """What this node measures is no evidence: the watchdog has found it implausible."""
         for axis in self.axes:
@@ -319,18 +342,23 @@ def _of(axis: Axis, what: str) -> str:
 def _unprepared(axis: Axis) -> str:
     if axis.state in PREPARED:
         return ""
-    place = f"{axis.drive.joint} (node {axis.drive.node_id})"
-    local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
+    local = "" if axis.statusword & REMOTE else f"; {LOCAL}"
     return (
-        f"{place} is in {axis.state.text if axis.state else 'no state known'}; if it stays: STO, main voltage?{local}"
+        f"{_place(axis)} is in {axis.state.text if axis.state else 'no state known'}; "
+        f"if it stays: STO, main voltage?{local}"
     )
 
 
 def _disabled(axis: Axis) -> str:
     if axis.state is DriveState.OPERATION_ENABLED:
         return ""
-    text = axis.state.text if axis.state else "in no state known"
-    return f"{axis.drive.joint} (node {axis.drive.node_id}) is {text}"
+    if axis.state is None:
+        return f"{_place(axis)} is in no state known"
+    return f"{_place(axis)} is {axis.state.text}{WHY_DISABLED.get(axis.state, '')}"
+
+
+def _place(axis: Axis) -> str:
+    return f"{axis.drive.joint} (node {axis.drive.node_id})"
 
 
 def _first(sentences: Iterable[str]) -> str:

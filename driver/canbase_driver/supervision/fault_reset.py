@@ -18,7 +18,8 @@ from canbase_runtime.watchdog_view import WatchdogView
 
 WATCHDOG_TIMEOUT_S = 0.5
 EDGE_S = 0.05
-"""How long bit 7 of the controlword stays 0, then 1: some drives sample it in a slow loop, after several PDOs."""
+"""How long bit 7 of the controlword stays 0, then 1, at the first try, and twice as long at each further one: some
+drives sample it in a slow loop, after several PDOs."""
 FAULT_TIMEOUT_S = 1.0
 """From the edge of bit 7 until the fault has gone."""
 FAULT_TRIES = 3
@@ -138,7 +139,7 @@ class Reset:
         return None
 
     def _edge(self, _situation: Situation, _answer: int | None, now_s: float) -> RequestOutcome | None:
-        if now_s - self._since_s >= self._edge_s:
+        if now_s - self._since_s >= self._edge_s * 2 ** (FAULT_TRIES - self._tries_left):
             self._go(ResetPhase.EDGE_HIGH if self.phase is ResetPhase.EDGE_LOW else ResetPhase.FAULTS, now_s)
         return None
 

@@ -172,7 +172,7 @@ def _long_unprepared(machine: StateMachine, s: Situation) -> str | None:
 
 def _too_late(machine: StateMachine, s: Situation) -> str | None:
     late = machine.elapsed_s > ENABLE_TIMEOUT_S
-    return f"{s.disabled} after {ENABLE_TIMEOUT_S:.1f} s" if late else None
+    return f"after {ENABLE_TIMEOUT_S:.1f} s {s.disabled}" if late else None
 
 
 def _asks_for_quick_stop(machine: StateMachine, s: Situation) -> str | None:

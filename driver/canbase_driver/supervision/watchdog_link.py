@@ -50,6 +50,8 @@ CAUSES = {
 }
 SENSOR_CAUSES = (12, 13, 17)
 """After these, what the node in the state frame reports about its motion is no evidence."""
+MOTION_CAUSES = (5, 12, 13, 14)
+"""A wheel does not move as it was ordered to."""
 RUNGS = ("none", "quick stop", "NMT pre-operational", "disable voltage", "heartbeat withheld", "NMT reset node")
 """How far up its ladder it has gone; the numbers are those of its state frame and of DriverStatus."""
 DRIVE_CAUSES = (3, 7, 18)
@@ -248,6 +250,11 @@ class WatchdogLink:
     def about_drive(self) -> bool:
         """The last trip was about a drive that sends nothing or is down."""
         return self._state is not None and self._state.cause in DRIVE_CAUSES
+
+    @property
+    def not_moving_as_ordered(self) -> int | None:
+        """The node whose wheel the last trip was about, 0: some wheel; None: it was not about motion."""
+        return self._state.node_id if self._state is not None and self._state.cause in MOTION_CAUSES else None
 
     def lying_node(self, now_s: float) -> int:
         """The node whose sensors the watchdog has found faulty; 0: none."""

@@ -226,7 +226,7 @@ def refuses(world: World, index: int) -> None:
 def test_a_drive_that_refuses_what_the_proof_relied_on_gets_no_power(kind: str, index: int) -> None:
     world = World(proven(kind))
     refuses(world, index)
-    world.run(2.5)
+    world.run(4.5)  # 2 s of them wait for its state to allow the write
     assert not any(world.powered)
     finding = world.core.finding
     assert finding.cause.value == "stop unproven"

@@ -223,7 +223,9 @@ def test_a_mode_that_is_not_taken_is_told() -> None:
     boot, _ = booted(drive, of_kind("epos4"))
     assert boot.report is not None
     assert boot.report.unshown_mode in notes_of(boot)
-    assert boot.report.unshown_mode.startswith("6061h:0 shows mode 0, 3 was set; it may take power to change, or time")
+    assert boot.report.unshown_mode == (
+        "6061h:0 shows mode 0, 3 was set 6 s ago: look what else sets it, the manufacturer's tool or an input"
+    )
 
 
 @pytest.mark.parametrize(("shows", "waits"), [("yes", True), ("probe", False)])
@@ -237,6 +239,9 @@ def test_a_mode_that_is_shown_late_is_waited_for_where_the_profile_says_that_it_
     bench = Bench(drive, base, base.drives[:1])
     bench.run(3.0)
     assert bench.boot.done is not waits
+    assert (
+        "it may take power to change, or time: with `options.mode_display: yes`" in str(bench.boot.report)
+    ) is not waits
     drive.objects[0x6061, 0] = u8(3)
     assert ("6061h" in str(notes_of(bench.run(1.0)))) is not waits
 

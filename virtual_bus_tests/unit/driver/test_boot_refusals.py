@@ -82,8 +82,8 @@ def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
         ),
         (
             0x6084,
-            "how hard left brakes is unknown: it must be at least 0.5 m/s² (limits.deceleration_mps2), a value of 955 "
-            "in the unit of its profile; set it with the manufacturer's tool",
+            "how hard left brakes is unknown: it must be at least 2 m/s² (limits.deceleration_mps2, in a curve), a "
+            "value of 3820 in the unit of its profile; set it with the manufacturer's tool",
         ),
         (
             0x6085,
@@ -115,14 +115,18 @@ def test_a_drive_without_6007h_does_not_stop_by_itself() -> None:
 @pytest.mark.parametrize(
     ("key", "so"),
     [
-        ((0x1016, 1), "so it does not stop by the watchdog's heartbeat: set 1016h:1 to 007E012Ch"),
-        ((0x6007, 0), "so no lost heartbeat or node guarding stops the motor: set 6007h:0 to 0003h"),
+        (
+            (0x1016, 1),
+            f"so it does not stop by the watchdog's heartbeat: set 1016h:1 to 007E012Ch {BY_HAND}, or "
+            "`timeouts.drive_heartbeat_s` in robot.yaml to what it takes",
+        ),
+        ((0x6007, 0), f"so no lost heartbeat or node guarding stops the motor: set 6007h:0 to 0003h {BY_HAND}"),
     ],
 )
 def test_what_a_drive_refuses_of_its_self_stop_is_named_with_what_that_means(key: Key, so: str) -> None:
     """A proof by commissioning would not count: the drive has both objects, so it is not offered."""
     boot = boot_one_axis(FakeDrive(refuse={key: INVALID}))
-    assert any(f"{so} {BY_HAND}, else only a wired STO does" in note for note in notes_of(boot))
+    assert any(f"{so}, else only a wired STO does" in note for note in notes_of(boot))
     assert "canbase setup commission" not in str(notes_of(boot))
     assert boot.report is not None
     assert not boot.report.stops_by_itself
@@ -290,8 +294,8 @@ def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is
 @pytest.mark.parametrize(
     ("shortest_ms", "hint"),
     [
-        (160, "It takes 160 ms: set `timeouts.drive_heartbeat_s: 0.32` in robot.yaml"),
-        (500, "It takes 500 ms: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
+        (160, "It has 160 ms then: set `timeouts.drive_heartbeat_s: 0.32` in robot.yaml"),
+        (500, "It has 500 ms then: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
         (
             501,
             "Nor any up to 500 ms: set 1017h:0 to 1 to 150 with the manufacturer's tool, "
@@ -307,6 +311,19 @@ def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_is_tried_wi
     text = error_of(boot)
     assert "it takes no heartbeat period of at most 150 ms (1017h:0: 0609 0030h value not valid)" in text
     assert hint in text
+
+
+@pytest.mark.parametrize(
+    ("period_ms", "hint"),
+    [(200, "It has 200 ms then: set `timeouts.drive_heartbeat_s: 0.4`"), (501, "Nor any up to 500 ms"), (0, "Nor any")],
+)
+def test_a_fixed_heartbeat_period_that_is_too_long_is_told_with_the_key_that_allows_it(
+    period_ms: int, hint: str
+) -> None:
+    drive = FakeDrive(
+        objects=factory_objects() | {(0x1017, 0): period_ms.to_bytes(2, "little")}, refuse={(0x1017, 0): READ_ONLY}
+    )
+    assert hint in error_of(boot_one_axis(drive))
 
 
 def test_what_cannot_be_read_is_written_all_the_same_and_proves_nothing() -> None:
@@ -719,10 +736,22 @@ def test_a_drive_that_keeps_a_quick_stop_as_hard_or_harder_is_noted(kept: int) -
 
 
 def test_an_ordinary_ramp_that_is_softer_than_the_driver_brakes_is_refused_too() -> None:
+    """In a curve a wheel brakes with 0.5 m/s² and 1.5 m/s²: both limits have to fit, by the same share."""
     drive = FakeDrive()
-    drive.objects[0x6084, 0] = u32(500)
+    drive.objects[0x6084, 0] = u32(955)
     drive.refuse[0x6084, 0] = 0x06090031
-    assert "set `limits.deceleration_mps2: " in str(error_of(boot_one_axis(drive)))
+    said = str(error_of(boot_one_axis(drive)))
+    assert "6084h:0 stays at 955: left brakes with 0.5 m/s² by it" in said
+    assert "set `limits.deceleration_mps2: 0.125` and `limits.angular_deceleration_radps2: " in said
+    assert "in robot.yaml, where they are 0.5 and " in said
+
+
+@pytest.mark.parametrize(("kept", "boots"), [(3628, False), (3631, True), (3820, True)])
+def test_an_ordinary_ramp_may_be_a_twentieth_softer_than_a_curve_needs(kept: int, boots: bool) -> None:
+    drive = FakeDrive()
+    drive.objects[0x6084, 0] = u32(kept)
+    drive.refuse[0x6084, 0] = 0x06090031
+    assert (boot_one_axis(drive).report is not None) is boots
 
 
 def test_a_drive_whose_quick_stop_coasts_and_cannot_be_told_otherwise_is_refused() -> None:
@@ -776,20 +805,34 @@ def test_a_range_in_which_the_position_wraps_is_refused_where_it_is_short(
     assert (boot.report is not None and said in str(boot.report.notes)) is is_noted
 
 
-def test_a_write_that_the_state_of_the_drive_forbids_once_is_tried_again_and_no_third_time() -> None:
-    refused: list[Key] = []
+class Busy(FakeDrive):
+    """Its state forbids each write so often, and then allows it."""
 
-    class Busy(FakeDrive):
-        def _write(self, key: Key, data: bytes) -> int:
-            if refused.count(key) < patience:
-                refused.append(key)
-                return DEVICE_STATE
-            return super()._write(key, data)
+    def __init__(self, times: int, only: Key | None = None) -> None:
+        super().__init__()
+        self.times, self.only = times, only
+        self.refused: list[Key] = []
 
-    patience = 1
-    assert notes_of(boot_one_axis(Busy())) == ()
-    assert len(refused) == len(set(refused)) > 10
-    patience = 3
-    refused.clear()
-    assert "0800 0022h" in str(error_of(boot_one_axis(Busy())))
-    assert max(refused.count(key) for key in refused) >= 2
+    def _write(self, key: Key, data: bytes) -> int:
+        if self.only in (None, key) and self.refused.count(key) < self.times:
+            self.refused.append(key)
+            return DEVICE_STATE
+        return super()._write(key, data)
+
+
+def test_each_write_that_the_state_of_the_drive_forbids_is_tried_again() -> None:
+    drive = Busy(1)
+    assert notes_of(boot_one_axis(drive)) == ()
+    assert len(drive.refused) == len(set(drive.refused)) > 10
+
+
+def test_a_drive_that_is_busy_for_almost_two_seconds_after_its_reset_is_booted() -> None:
+    """A pause takes 20 ms."""
+    assert notes_of(boot_one_axis(Busy(99, (0x6060, 0)))) == ()
+
+
+def test_after_two_seconds_of_pauses_a_write_is_tried_once_again_and_no_third_time() -> None:
+    drive = Busy(10_000)
+    assert "0800 0022h" in str(error_of(boot_one_axis(drive)))
+    counts = sorted({drive.refused.count(key) for key in drive.refused})
+    assert counts in ([101], [2, 101])

@@ -89,10 +89,39 @@ def test_which_states_may_have_power(story: Story, word: int, power: bool) -> No
     assert story.drives.may_have_power(10.0) is power
 
 
-@pytest.mark.parametrize(("word", "state"), [(SWITCHED_ON, "switched on"), (NO_STATE, "in no state known")])
+@pytest.mark.parametrize(
+    ("word", "state"), [(SWITCHED_ON, "switched on (an input that enables it?)"), (NO_STATE, "in no state known")]
+)
 def test_who_is_not_enabled_is_named(story: Story, word: int, state: str) -> None:
     story.say(1, word)
     assert story.drives.disabled() == f"right_wheel (node 2) is {state}"
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "node_id", "said"),
+    [
+        (ENABLED, ENABLED, 0, ""),
+        (ENABLED, ENABLED & ~0x0200, 0, "right_wheel (node 2): it is in local mode and ignores the controlword"),
+        (ENABLED, ENABLED & ~0x0200, 2, "right_wheel (node 2): it is in local mode and ignores the controlword"),
+        (ENABLED, ENABLED & ~0x0200, 1, ""),
+        (
+            ENABLED,
+            ENABLED | 0x0800,
+            0,
+            "right_wheel (node 2): a limit in the drive is active (statusword bit 11): 607Fh",
+        ),
+        (ENABLED | 0x0800, ENABLED | 0x0800, 1, "left_wheel (node 1): a limit in the drive is active"),
+        (ENABLED | 0x0800, ENABLED, 2, ""),
+    ],
+)
+def test_what_a_statusword_says_about_a_wheel_that_does_not_follow(
+    story: Story, left: int, right: int, node_id: int, said: str
+) -> None:
+    story.say(0, left)
+    story.say(1, right)
+    found = story.drives.not_following(node_id)
+    assert found.startswith(said)
+    assert bool(found) is bool(said)
 
 
 @pytest.mark.parametrize("word", [FAULT, REACTION])

@@ -108,7 +108,7 @@ def test_a_drive_that_refuses_everything_for_12_s_after_its_nmt_reset_is_waited_
         story.run(story.now_s + 0.01)
     said = list(dict.fromkeys(story.said))
     assert any("its boot-up message has not come: it may take longer, and the boot learns how long" in s for s in said)
-    assert any("it answered 12.0 s after an NMT reset: set `start.boot_up_s: 16.2`" in s for s in said)
+    assert any("it answered 12.0 s after an NMT reset: set `start.boot_up_s: 16.1`" in s for s in said)
     assert [said for said in story.said if WIRING in said] == []
 
 

@@ -170,7 +170,7 @@ def test_enabling_gives_up_after_two_seconds_and_needs_a_reset() -> None:
     story = at(ENABLING)
     assert story.lasts(READY, ON) == pytest.approx(2.0, abs=0.021)
     assert story.told == (STOPPING, "enable timeout", True)
-    assert story.state_machine.finding.detail == "left is switch on disabled after 2.0 s"
+    assert story.state_machine.finding.detail == "after 2.0 s left is switch on disabled"
     story.step(READY, cycles=3)
     assert story.told == (LATCHED, "enable timeout", True)
 
