@@ -13,7 +13,7 @@ from canbase_config.robot import Robot
 from canbase_fleet.exposition import Exposition
 from canbase_fleet.http_server import Page, PageServer
 from canbase_fleet.robot_topics import POLL_S, RobotTopics, end_signals, utc_now
-from canbase_fleet.vda5050 import line, state
+from canbase_fleet.vda5050 import V2, V3, line, state
 from canbase_runtime.private_process import guard_keys
 from canbase_runtime.version import installed_version
 from canbase_runtime.web_names import authority
@@ -62,10 +62,14 @@ def run(
 def _pages(robot: Robot, topics: Sequence[RobotTopics]) -> Mapping[str, Page]:
     version = installed_version()
 
-    def vda5050(_plain: bool) -> tuple[bytes, str]:
-        return f"{line(state(topics[0].view(), robot, utc_now()))}\n".encode(), "application/json"
+    def vda5050(protocol: str) -> Page:
+        def page(_plain: bool) -> tuple[bytes, str]:
+            return f"{line(state(topics[0].view(), robot, utc_now(), protocol))}\n".encode(), "application/json"
+
+        return page
 
     return {
         "/metrics": lambda plain: Exposition(topics[0].view(), robot, version).text(plain),
-        "/vda5050/state": vda5050,
+        "/vda5050/state": vda5050(V2),
+        "/vda5050/v3/state": vda5050(V3),
     }

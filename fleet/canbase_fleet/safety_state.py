@@ -1,4 +1,4 @@
-"""`safetyState` of the VDA 5050 state message, version 2.1.0, from what is known of the robot. Pure.
+"""`safetyState` of the VDA 5050 state message, versions 2.1.0 and 3.0.0, from what is known of the robot. Pure.
 
 eStop is the way in which a stop is acknowledged: MANUAL at the vehicle, AUTOACK by itself, NONE: no stop is active.
 The first rule that applies decides; NONE is what is left when every part has reported that nothing stops the base.
@@ -20,7 +20,7 @@ from canbase_runtime.watchdog_view import WatchdogView, watchdog_view
 
 
 class EStop(Enum):
-    """Of VDA 5050, state.safetyState.eStop. REMOTE, an emergency stop of the facility, is unknown to canbase."""
+    """Of VDA 5050: eStop (2.1.0), activeEmergencyStop (3.0.0). REMOTE, of the facility, is unknown to canbase."""
 
     AUTOACK = "AUTOACK"
     MANUAL = "MANUAL"
@@ -30,6 +30,8 @@ class EStop(Enum):
 Rule = Callable[[RobotView, Robot], bool]
 STOP: Final = 3
 """Of SafetyState.msg. Greater numbers do not exist; they would be no better."""
+FIELD: Final = SCAN_LOST | {StopCause.OBSTACLE, StopCause.SCAN_BLIND, StopCause.UNKNOWN}
+"""Causes of the protective field: something is in it, or it is not known whether."""
 ORDINARY: Final = (DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLING, DriverState.ENABLED)
 """Nothing is being stopped. Without power the base does not move; why it has none is in `errors`."""
 
@@ -37,6 +39,16 @@ ORDINARY: Final = (DriverState.BOOTING, DriverState.DISARMED, DriverState.ENABLI
 def estop(view: RobotView, robot: Robot) -> EStop:
     """By the first of RULES that applies."""
     return next((answer for applies, answer in RULES if applies(view, robot)), EStop.NONE)
+
+
+def active_emergency_stop(view: RobotView, robot: Robot) -> EStop:
+    """Of version 3.0.0, which has no AUTOACK: NONE while only the protective field stops the base, otherwise MANUAL."""
+    answer = estop(view, robot)
+    if answer is not EStop.AUTOACK:
+        return answer
+    is_field = stop_cause(view.safety.message.cause) in FIELD and not view.safety.message.estop
+    other = any(rule(view, robot) for rule in (_watchdog_is_missing, _driver_stops))
+    return EStop.NONE if is_field and not other else EStop.MANUAL
 
 
 def field_violation(view: RobotView, robot: Robot) -> bool:
@@ -47,8 +59,7 @@ def field_violation(view: RobotView, robot: Robot) -> bool:
     if not view.safety.fresh:
         return True
     message = view.safety.message
-    cause = stop_cause(message.cause)
-    if cause in (StopCause.OBSTACLE, StopCause.SCAN_BLIND, StopCause.UNKNOWN) or cause in SCAN_LOST:
+    if stop_cause(message.cause) in FIELD:
         return True
     if any(scanner.required and not scanner.fresh for scanner in message.scanners):
         return True
@@ -99,6 +110,8 @@ def _driver_stops(view: RobotView, robot: Robot) -> bool:
     return driver_state(view.driver.message.state) not in ORDINARY
 
 
+_watchdog_is_missing = _watchdog_is(WatchdogView.MISSING)
+
 RULES: Final[tuple[tuple[Rule, EStop], ...]] = (
     (_not_known, EStop.MANUAL),
     (_latched, EStop.MANUAL),
@@ -106,6 +119,6 @@ RULES: Final[tuple[tuple[Rule, EStop], ...]] = (
     (_button_latches, EStop.MANUAL),
     (_filter_is_unclear, EStop.MANUAL),
     (_filter_stops, EStop.AUTOACK),
-    (_watchdog_is(WatchdogView.MISSING), EStop.AUTOACK),
+    (_watchdog_is_missing, EStop.AUTOACK),
     (_driver_stops, EStop.AUTOACK),
 )

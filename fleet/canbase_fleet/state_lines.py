@@ -10,7 +10,7 @@ from typing import Final
 from canbase_config.robot import Robot
 from canbase_fleet.robot_topics import POLL_S, RobotTopics, end_signals, utc_now
 from canbase_fleet.robot_view import RobotView
-from canbase_fleet.vda5050 import essence, line, state
+from canbase_fleet.vda5050 import V2, essence, line, state
 
 NODE: Final = "canbase_vda5050"
 PERIOD_S: Final = 1.0
@@ -18,7 +18,7 @@ PATIENCE_S: Final = 5.0
 """Of --once: the nodes find each other within that, on a busy computer too."""
 
 
-def run(robot: Robot, ros_args: Sequence[str], once: bool, write: Callable[[str], None]) -> None:
+def run(robot: Robot, ros_args: Sequence[str], once: bool, write: Callable[[str], None], version: str = V2) -> None:
     """Writes lines until SIGINT or SIGTERM. `once`: one, when every topic has come, or PATIENCE_S have passed.
 
     Call from the main thread (signals).
@@ -35,7 +35,7 @@ def run(robot: Robot, ros_args: Sequence[str], once: bool, write: Callable[[str]
                     continue
                 if (new := essence(view, robot)) != before or now_s - last_s >= PERIOD_S:
                     before, last_s = new, now_s
-                    write(line(state(view, robot, utc_now())))
+                    write(line(state(view, robot, utc_now(), version)))
                 if once:
                     return
         finally:

@@ -1,4 +1,4 @@
-"""`errors` of the VDA 5050 state message, version 2.1.0: everything that keeps the robot from driving, or will. Pure.
+"""`errors` of the VDA 5050 state message, 2.1.0 and 3.0.0: everything that keeps the robot from driving, or will. Pure.
 
 FATAL: not in running condition, somebody has to act. WARNING: it can drive. Each error names where it was seen in its
 references, and what ends it in its hint. A topic that is silent is an error, and says nothing else.

@@ -60,10 +60,10 @@ class Fleet:
         samples = [sample for family in families for sample in family.samples]
         return {" ".join([sample.name, *sample.labels.values()]): float(sample.value) for sample in samples}
 
-    def state(self) -> dict[str, Any]:
-        """At /vda5050/state; empty while the server is not there."""
+    def state(self, page: str = "/vda5050/state") -> dict[str, Any]:
+        """Of VDA 5050; empty while the server is not there."""
         try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/vda5050/state", timeout=PATIENCE_S) as answer:
+            with urllib.request.urlopen(f"http://127.0.0.1:{self.port}{page}", timeout=PATIENCE_S) as answer:
                 return dict(json.loads(answer.read()))
         except urllib.error.URLError:
             return {}
@@ -165,6 +165,7 @@ def test_the_state_for_vda_5050_follows_the_stop_button(fleet: Fleet) -> None:
     fleet.world.estop.message = Bool(data=False)  # released, and no reset yet
     fleet.robot.node.spin_for(0.5)
     assert fleet.state()["safetyState"]["eStop"] == "MANUAL"
+    assert fleet.state("/vda5050/v3/state")["safetyState"]["activeEmergencyStop"] == "MANUAL"
     fleet.world.heal()
     fleet.wait_estop("NONE")
 

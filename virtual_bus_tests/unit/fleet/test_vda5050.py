@@ -13,8 +13,8 @@ from jsonschema import Draft202012Validator
 
 from canbase_driver.causes import DriverCause
 from canbase_fleet.robot_view import RobotView
-from canbase_fleet.safety_state import EStop, driving, estop, field_violation
-from canbase_fleet.vda5050 import essence, line, state
+from canbase_fleet.safety_state import EStop, active_emergency_stop, driving, estop, field_violation
+from canbase_fleet.vda5050 import V2, V3, essence, line, state
 from canbase_fleet.vda_errors import MOST, errors
 from canbase_runtime.driver_state import DriverState
 from canbase_runtime.last_message import NOT_RECEIVED
@@ -74,6 +74,35 @@ def test_a_robot_that_drives_has_no_error_and_no_stop() -> None:
 )
 def test_how_a_stop_is_acknowledged(changes: dict[str, Any], expected: EStop) -> None:
     assert estop(well(**changes), ROBOT) is expected
+
+
+OBSTACLE: dict[str, Any] = {"action": SafetyState.STOP, "cause": SafetyState.CAUSE_OBSTACLE}
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, EStop.NONE),
+        ({"safety": safety(**OBSTACLE)}, EStop.NONE),
+        ({"safety": safety(action=SafetyState.STOP, cause=SafetyState.CAUSE_SCAN_STALE)}, EStop.NONE),
+        ({"safety": safety(**BUTTON)}, EStop.MANUAL),
+        ({"safety": safety(**OBSTACLE, estop=True)}, EStop.MANUAL),
+        ({"safety": safety(**OBSTACLE), "driver": driver(watchdog="missing")}, EStop.MANUAL),
+        ({"safety": safety(**OBSTACLE), "driver": driver(state=DriverStatus.STOPPING)}, EStop.MANUAL),
+        ({"safety": safety(**OBSTACLE), "driver": NOT_RECEIVED}, EStop.MANUAL),
+        ({"safety": safety(action=SafetyState.STOP, cause="command_stale", clearance_behind_m=0.0)}, EStop.MANUAL),
+        ({"safety": safety(action=SafetyState.STOP, cause="by magic")}, EStop.MANUAL),
+    ],
+)
+def test_version_3_has_no_stop_that_ends_by_itself_but_that_of_the_protective_field(
+    changes: dict[str, Any], expected: EStop
+) -> None:
+    """Without a button that latches, which is AUTOACK in 2.1.0."""
+    view = well(**changes)
+    assert active_emergency_stop(view, UNLATCHED) is expected
+    stated = state(view, UNLATCHED, NOW, V3)
+    assert (stated["version"], stated["safetyState"]["activeEmergencyStop"]) == ("3.0.0", expected.value)
+    assert expected is EStop.MANUAL or estop(view, UNLATCHED) is EStop.NONE or field_violation(view, UNLATCHED)
 
 
 def test_a_button_that_does_not_latch_is_acknowledged_by_itself() -> None:
@@ -227,16 +256,20 @@ VIEWS = [
 ]
 
 
-@pytest.mark.parametrize("schema", schemas())
+@pytest.mark.parametrize(("version", "schema"), schemas())
 @pytest.mark.parametrize("view", VIEWS)
-def test_a_fleet_client_that_takes_the_keys_in_sends_a_valid_state(schema: dict[str, Any], view: RobotView) -> None:
-    message = OF_THE_CLIENT | json.loads(line(state(view, ROBOT, NOW)))
+def test_a_fleet_client_that_takes_the_keys_in_sends_a_valid_state(
+    version: str, schema: dict[str, Any], view: RobotView
+) -> None:
+    message = OF_THE_CLIENT | json.loads(line(state(view, ROBOT, NOW, version)))
+    other = OF_THE_CLIENT | json.loads(line(state(view, ROBOT, NOW, V2 if version == V3 else V3)))
     check = Draft202012Validator(schema, format_checker=Draft202012Validator.FORMAT_CHECKER)
     assert [error.message for error in check.iter_errors(message)] == []
     for wrong in (
         {"errors": [{"errorType": "x"}]},
-        {"safetyState": {"eStop": "MAYBE", "fieldViolation": True}},
+        {"safetyState": {next(iter(message["safetyState"])): "MAYBE", "fieldViolation": True}},
         {"driving": None},
         {"timestamp": "yesterday"},
+        {"safetyState": other["safetyState"]},
     ):
         assert not check.is_valid(message | wrong)
