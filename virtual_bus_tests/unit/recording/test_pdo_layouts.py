@@ -74,6 +74,19 @@ def test_the_default_mapping_of_cia_402_is_assumed_where_the_length_fits(cob_id:
     assert PdoLayouts().of(cob_id, length + 1) is None
 
 
+def test_beside_canbase_s_watchdog_a_drive_is_one_whatever_its_device_type_and_its_other_pdos() -> None:
+    """canbase has booted it: what refutes the default mapping of CiA 402 does not refute canbase's."""
+    layouts = PdoLayouts()
+    layouts.on_object(3, 0x1000, 0, 0)
+    assert layouts.of(0x183, 6) is layouts.of(0x183, 2) is None
+    layouts.on_canbase()
+    layouts.on_object(3, 0x1000, 0, 0)
+    assert layouts.of(0x483, 7) is None
+    found = layouts.of(0x183, 6)
+    assert found is not None
+    assert found.source is Source.CANBASE
+
+
 def test_beside_canbase_s_watchdog_canbase_s_layout_is_assumed() -> None:
     layouts = PdoLayouts()
     assert layouts.of(0x283, 6) is None
