@@ -143,7 +143,7 @@ OF_THE_SETPOINTS = (
     ),
     BaseSign("left_right", lambda view: f"left and right wheels are ordered {view.skew}" if view.skew else ""),
 )
-AGAINST = ", the other way: see `direction` in robot.yaml, motor phases, encoder"
+AGAINST = "; it turns the other way: see `direction` in robot.yaml, motor phases, encoder"
 
 
 def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
@@ -152,7 +152,8 @@ def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict
         if axis.powered and feedback.outside_samples >= config.feedback_samples:
             detail = (
                 f"{axis.drive.joint} turns at {axis.velocity_mps:.3f} m/s, "
-                f"its setpoints allow {feedback.low_mps:.3f} to {feedback.high_mps:.3f} m/s"
+                f"its setpoints allow {feedback.low_mps:.3f} to {feedback.high_mps:.3f} m/s "
+                f"(watchdog.drive_lag_s {config.drive_lag_s:g} s)"
                 + (AGAINST if axis.velocity_mps * axis.setpoint_mps < 0.0 else "")
             )
             return Verdict(TripCause.MOTION_OUTSIDE, axis.drive.node_id, detail)

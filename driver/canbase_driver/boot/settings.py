@@ -291,7 +291,7 @@ def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[
             has_ms = (yield from node.read_if_present(HEARTBEAT_PRODUCER)) or 0
             if longest_ms < has_ms <= HEARTBEAT_PERIODS_MS[-1]:
                 key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * has_ms / 1000:g}`"
-                raise BootError(node.node_id, problem, f"It has {has_ms} ms then: set {key} in robot.yaml")
+                raise BootError(node.node_id, problem, f"It keeps {has_ms} ms: set {key} in robot.yaml")
     tool = f"set 1017h:0 to 1 to {longest_ms} with the manufacturer's tool"
     none = (
         f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {tool}, or, {GUARDING_ALONE}; without either it cannot be used"

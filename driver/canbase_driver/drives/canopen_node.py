@@ -241,9 +241,10 @@ class CanopenNode:
             unasked_s = min(max(0.0, sync_since - axis.fed_at), timeouts.drive_heartbeat_s)
             if axis.age_s(now_s) - unasked_s > feedback_s:
                 value = "status" if axis.status_at <= axis.velocity_at else "velocity"
-                return f"{self.name}: no {value} for {axis.age_s(now_s):.2f} s"
+                return f"{self.name}: no {value} for {axis.age_s(now_s):.2f} s (timeouts.feedback_s {feedback_s:g} s)"
         if now_s - self.heartbeat_at > timeouts.drive_heartbeat_s:
-            return f"{self.name}: no heartbeat for {now_s - self.heartbeat_at:.2f} s"
+            limit = f"timeouts.drive_heartbeat_s {self._robot.timeouts.drive_heartbeat_s:g} s"
+            return f"{self.name}: no heartbeat for {now_s - self.heartbeat_at:.2f} s ({limit})"
         return ""
 
     def begin_boot(self, now_s: float) -> None:
@@ -522,8 +523,8 @@ class CanopenNode:
         cob_id = f"{pdo.cob_id:03X}h"
         return (
             f"{pdo.name} ({cob_id}) of {axis.drive.joint} with {size} bytes, its mapping has {pdo.size}: let "
-            f"{pdo.mapping_object:04X}h map {objects} alone, with the manufacturer's tool, or find the other device "
-            f"that sends {cob_id}; {ELSE_UNUSABLE}"
+            f"{pdo.mapping_object:04X}h map {objects} alone and without padding, with the manufacturer's tool, or find "
+            f"the other device that sends {cob_id}; {ELSE_UNUSABLE}"
         )
 
     def _go(self, presence: Presence, now_s: float) -> None:

@@ -22,10 +22,11 @@ from canbase_driver.drives.drive_snapshot import DriveSnapshot
 
 LOCAL = "it is in local mode and ignores the controlword (statusword bit 9)"
 LIMITED = "a limit in the drive is active (statusword bit 11): 607Fh, 6080h, its current limit, or the load"
+NO_CODE = "no code given: see 603Fh, its display or the manufacturer's tool"
 WHY_DISABLED = {
     DriveState.SWITCH_ON_DISABLED: " (STO, main voltage?)",
     DriveState.READY_TO_SWITCH_ON: " (STO, main voltage?)",
-    DriveState.SWITCHED_ON: " (an input that enables it?)",
+    DriveState.SWITCHED_ON: " (an input that enables it, or a brake that opens slowly?)",
     DriveState.QUICK_STOP_ACTIVE: " (a quick stop of its own: a limit switch or another input?)",
 }
 """Where to look when a drive that shall have power has this state."""
@@ -331,7 +332,7 @@ def _snapshot(node: CanopenNode, axis: Axis, now_s: float) -> DriveSnapshot:
 def _fault(node: CanopenNode) -> str:
     for axis in node.axes:
         if axis.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
-            return f"{axis.drive.joint} (node {node.node_id}): {node.emcy_text() or 'no code given'}"
+            return f"{axis.drive.joint} (node {node.node_id}): {node.emcy_text() or NO_CODE}"
     return ""
 
 

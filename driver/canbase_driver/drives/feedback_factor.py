@@ -59,6 +59,8 @@ class FeedbackFactor:
     @property
     def sentence(self) -> str:
         """What contradicts what, and what to do about it; empty: they agree, or it cannot be told."""
+        if self._way_m == 0.0 and math.sqrt(self._yy) > LEAST_M:
+            return f"{self._named(VELOCITY_ACTUAL)} stays 0 while {self._named(POSITION_ACTUAL)} counts"
         if not LEAST_M < self._way_m <= ENOUGH_M or self._xx == 0.0:
             return ""
         slope = self._xy / self._xx
@@ -94,7 +96,8 @@ class FeedbackFactor:
             )
         return (
             f"{self._named(POSITION_ACTUAL)} counts {float(f'{factor:.2g}'):g} times as far as "
-            f"{self._named(VELOCITY_ACTUAL)} shows: check {keys} in robot.yaml, and 608Fh to 6096h in the drive"
+            f"{self._named(VELOCITY_ACTUAL)} shows: check {keys} in robot.yaml, and 608Fh to 6096h in the drive; where "
+            "the wheel goes as far as it shall, `units.actual_velocity` of its drive profile"
         )
 
     def _named(self, index: int) -> str:

@@ -294,8 +294,8 @@ def test_where_the_wanted_heartbeat_period_is_refused_the_nearest_allowed_one_is
 @pytest.mark.parametrize(
     ("shortest_ms", "hint"),
     [
-        (160, "It has 160 ms then: set `timeouts.drive_heartbeat_s: 0.32` in robot.yaml"),
-        (500, "It has 500 ms then: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
+        (160, "It keeps 160 ms: set `timeouts.drive_heartbeat_s: 0.32` in robot.yaml"),
+        (500, "It keeps 500 ms: set `timeouts.drive_heartbeat_s: 1` in robot.yaml"),
         (
             501,
             "Nor any up to 500 ms: set 1017h:0 to 1 to 150 with the manufacturer's tool, "
@@ -315,7 +315,7 @@ def test_a_drive_that_takes_no_heartbeat_period_that_is_short_enough_is_tried_wi
 
 @pytest.mark.parametrize(
     ("period_ms", "hint"),
-    [(200, "It has 200 ms then: set `timeouts.drive_heartbeat_s: 0.4`"), (501, "Nor any up to 500 ms"), (0, "Nor any")],
+    [(200, "It keeps 200 ms: set `timeouts.drive_heartbeat_s: 0.4`"), (501, "Nor any up to 500 ms"), (0, "Nor any")],
 )
 def test_a_fixed_heartbeat_period_that_is_too_long_is_told_with_the_key_that_allows_it(
     period_ms: int, hint: str

@@ -90,7 +90,11 @@ def test_which_states_may_have_power(story: Story, word: int, power: bool) -> No
 
 
 @pytest.mark.parametrize(
-    ("word", "state"), [(SWITCHED_ON, "switched on (an input that enables it?)"), (NO_STATE, "in no state known")]
+    ("word", "state"),
+    [
+        (SWITCHED_ON, "switched on (an input that enables it, or a brake that opens slowly?)"),
+        (NO_STATE, "in no state known"),
+    ],
 )
 def test_who_is_not_enabled_is_named(story: Story, word: int, state: str) -> None:
     story.say(1, word)
@@ -127,7 +131,7 @@ def test_what_a_statusword_says_about_a_wheel_that_does_not_follow(
 @pytest.mark.parametrize("word", [FAULT, REACTION])
 def test_a_fault_is_named_with_the_code_that_the_drive_gave(story: Story, word: int) -> None:
     story.say(1, word)
-    assert story.drives.fault() == "right_wheel (node 2): no code given"
+    assert story.drives.fault().startswith("right_wheel (node 2): no code given: see 603Fh")
     story.drives.nodes[1].emcy = Emcy(2, 0x7305, 0x20, b"")
     assert story.drives.fault() == "right_wheel (node 2): 7305h encoder"
 
@@ -144,7 +148,7 @@ def test_the_first_node_that_is_silent_is_named(story: Story) -> None:
     for node in story.drives.nodes:
         node.heartbeat_at = 10.0
     assert story.drives.silent(10.0, 9.0) == ""
-    assert story.drives.silent(10.2, 9.0) == "node 1 (left_wheel): no status for 0.20 s"
+    assert story.drives.silent(10.2, 9.0) == "node 1 (left_wheel): no status for 0.20 s (timeouts.feedback_s 0.1 s)"
 
 
 def test_several_wheels_on_a_side_are_averaged_and_the_fastest_is_found() -> None:

@@ -137,12 +137,12 @@ def test_the_sentences_about_feedback_have_the_values() -> None:
     )
     right = replace(STANDING, target_mps=0.3)
     assert detail(replace(fast, feedback=Feedback(-0.1, 0.5, outside_samples=5)), right) == (
-        "wheel_1_0 turns at 1.300 m/s, its setpoints allow -0.100 to 0.500 m/s"
+        "wheel_1_0 turns at 1.300 m/s, its setpoints allow -0.100 to 0.500 m/s (watchdog.drive_lag_s 0.1 s)"
     )
     for setpoint_mps, against in ((0.3, False), (0.0, False), (-0.001, True)):
         outside = replace(fast, setpoint_mps=setpoint_mps, feedback=Feedback(-0.1, 0.5, outside_samples=5))
         assert detail(outside, right).endswith(
-            ", the other way: see `direction` in robot.yaml, motor phases, encoder"
+            "; it turns the other way: see `direction` in robot.yaml, motor phases, encoder"
         ) is (against)
     assert detail(replace(fast, feedback=Feedback(overspeed_samples=5)), right) == (
         "wheel_1_0 turns at 1.300 m/s (allowed 1.200 m/s)"
