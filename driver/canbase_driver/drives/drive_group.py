@@ -22,7 +22,7 @@ from canbase_driver.drives.drive_snapshot import DriveSnapshot
 
 LOCAL = "it is in local mode and ignores the controlword (statusword bit 9)"
 LIMITED = "a limit in the drive is active (statusword bit 11): 607Fh, 6080h, its current limit, or the load"
-NO_CODE = "no code given: see 603Fh, its display or the manufacturer's tool"
+NO_CODE = "no code given: see canbase bus emcy, its display or the manufacturer's tool"
 WHY_DISABLED = {
     DriveState.SWITCH_ON_DISABLED: " (STO, main voltage?)",
     DriveState.READY_TO_SWITCH_ON: " (STO, main voltage?)",

@@ -131,7 +131,7 @@ def test_what_a_statusword_says_about_a_wheel_that_does_not_follow(
 @pytest.mark.parametrize("word", [FAULT, REACTION])
 def test_a_fault_is_named_with_the_code_that_the_drive_gave(story: Story, word: int) -> None:
     story.say(1, word)
-    assert story.drives.fault().startswith("right_wheel (node 2): no code given: see 603Fh")
+    assert story.drives.fault().startswith("right_wheel (node 2): no code given: see canbase bus emcy")
     story.drives.nodes[1].emcy = Emcy(2, 0x7305, 0x20, b"")
     assert story.drives.fault() == "right_wheel (node 2): 7305h encoder"
 
