@@ -97,7 +97,8 @@ class Caller:
         if not self.is_offered(service, self._wait_s):
             name = self._client(service).srv_name
             node = service.partition("/")[0].replace("_", " ")
-            fail(f"no {node} offers {name}; is it running (canbase up), in this namespace?", NO_DRIVER)
+            ask = "does it run (canbase up), in this namespace, or does it hang (canbase doctor)?"
+            fail(f"no {node} offers {name}; {ask}", NO_DRIVER)
 
     def call(self, service: str) -> str:
         """The sentence for an answer that reports success."""

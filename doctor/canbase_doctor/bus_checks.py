@@ -53,7 +53,7 @@ class BusEvidence:
 def bus_checks(seen: BusEvidence) -> list[Check]:
     """All rows, from what explains most to the rest."""
     if seen.problem:
-        return [fail("CAN bus", seen.problem, "bring it up: sudo ip link set can0 up type can bitrate …")]
+        return [fail("CAN bus", seen.problem, "docs/wiring.md, Bring the interface up")]
     rows = [*_interface(seen), _load(seen), _masters(seen), *_watchdog(seen)]
     for node_id in sorted({drive.node_id for drive in seen.robot.drives}):
         rows += _node(seen, node_id, tuple(drive for drive in seen.robot.drives if drive.node_id == node_id))
@@ -191,11 +191,10 @@ def _unread(seen: BusEvidence, name: str, node_id: int) -> Check:
         return warn(
             name, f"it sends frames, {_ages(seen, node_id)}; {why}", "run doctor again when its SDO channel is free"
         )
-    return fail(
-        name,
-        f"no frame received; {why}",
-        "power, cable, termination, bit rate, node id; canbase bus scan shows who answers",
-    )
+    cure = "power, cable, termination, bit rate, node id; canbase bus scan shows who answers"
+    if seen.robot.bus.is_virtual:
+        cure = "do the simulated drives run (canbase up, or canbase serve sim), on this bus?"
+    return fail(name, f"no frame received; {why}", cure)
 
 
 def _identity(name: str, found: Inspection, drives: tuple[Drive, ...]) -> Check:

@@ -179,7 +179,8 @@ def scanners(evidence: Evidence) -> list[Check]:
 
 def _scanner(scanner: Any, dropped: int) -> Check:
     """`dropped`: scans within the observation."""
-    name, found = f"scanner {scanner.topic}", f"last usable scan {_age(scanner.age_s)} old"
+    seen = "no usable scan yet" if math.isnan(scanner.age_s) else f"last usable scan {scanner.age_s:.2f} s old"
+    name, found = f"scanner {scanner.topic}", seen
     if not math.isnan(scanner.usable_share):
         found += f", {scanner.usable_share:.0%} of its beams are usable"
     if dropped or scanner.problem:

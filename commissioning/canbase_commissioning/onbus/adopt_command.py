@@ -14,7 +14,7 @@ from canbase_base.single_instance import TakenError, bus_name, take
 from canbase_commissioning.bus_monitor import ListenSession
 from canbase_commissioning.census import Census, require_no_power
 from canbase_commissioning.conversation import Conversation, ConversationError, Talk, say
-from canbase_commissioning.guide import Ask, CommissionError, Tell
+from canbase_commissioning.guide import Ask, CommissionError, Tell, confirm
 from canbase_commissioning.lss import bit_rate_search, master, protocol
 from canbase_commissioning.lss.adoption import discover, is_anybody_here, look, require_lss, take_into_use
 from canbase_commissioning.lss.assignment import check_node_id, proposals, too_few, too_many
@@ -188,7 +188,7 @@ def _discover_and_assign(adoption: Adoption, bitrate: int) -> dict[Identity, int
         raise ConversationError(surplus)
     missing = too_few(found, adoption.robot)
     if missing:
-        adoption.ask(Ask("few", f"{missing}. Go on with these?", confirms=True))
+        adoption.ask(Ask("few", f"{missing}. Go on with these (yes, no)?", confirm))  # --yes does not mean this
     return _assigned(adoption, proposals(found, census.identities, adoption.robot))
 
 

@@ -197,7 +197,7 @@ SOUND = {"topic": "scan", "required": True, "fresh": True, "age_s": 0.05, "usabl
         ({"dropped": 7}, 2, Verdict.WARN, "5 scans dropped"),
         ({"usable_share": 0.3}, 0, Verdict.WARN, "30% of its beams"),
         ({"fresh": False, "dropped": 7, "problem": "angle_increment is 0"}, 2, Verdict.FAIL, "angle_increment is 0"),
-        ({"fresh": False, "age_s": math.nan, "usable_share": math.nan}, 0, Verdict.FAIL, "never"),
+        ({"fresh": False, "age_s": math.nan, "usable_share": math.nan}, 0, Verdict.FAIL, "no usable scan yet"),
         ({"fresh": False, "required": False, "age_s": math.nan, "usable_share": math.nan}, 0, Verdict.OK, "required"),
     ],
 )

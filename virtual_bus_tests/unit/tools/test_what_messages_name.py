@@ -55,7 +55,7 @@ EDS: Final = read_eds(profile_path("generic").parents[1] / "eds" / "canbase_cia4
 OBJECTS: Final = frozenset((*EDS.names, *SCALE_OBJECTS, *VL_OBJECTS.values(), MIN_MAX, *RAMPS.values(), *SDO_SERVERS))
 """The objects that canbase knows: those of its EDS, those of the units, those of mode 2, SDO channels."""
 OTHERS: Final = (0x6000, 0x607F, 0x6080)
-"""Where the objects of the first axis begin; max profile velocity and max motor speed (CiA 402-2), which it only names."""
+"""Where the objects of the first axis begin; max profile velocity, max motor speed (CiA 402-2): only named."""
 _DOTTED: Final = re.compile(r"(?<![\w/.@-])[a-z][a-z_]*(?:\.[a-z_0-9]+)+(?![\w/(-])")
 _QUOTED_KEY: Final = re.compile(r"`([a-z][a-z_0-9.]*)(?:: [^`]*)?`")
 _QUOTED_LINE: Final = re.compile(r"`(canbase [^`]*)`")
