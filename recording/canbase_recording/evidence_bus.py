@@ -32,16 +32,23 @@ _RECEIVES_NOTHING: Final = (0x8130, 0x8250, 0x8120, 0x8140)
 """EMCY: heartbeat or life guarding lost, RPDO timeout, error passive, recovered from bus-off."""
 
 
-def recorder_paused(scene: Scene) -> Found | None:
-    """Nothing at all was recorded for a while: neither sent nor received."""
+def pause(scene: Scene) -> tuple[float, float] | None:
+    """Since when nothing at all was recorded, neither sent nor received, and for how long [s]; None: it went on."""
     times = around_times(scene.frame_times, scene.reaction_s - 2.0, scene.reaction_s + 0.5)
     gaps = [(b - a, a) for a, b in itertools.pairwise(times)]
     if not gaps:
         return None
     longest_s, since_s = max(gaps)
     usual_s = sorted(gap for gap, _ in gaps)[len(gaps) // 2]
-    if longest_s < max(PAUSE_S, 20.0 * usual_s) or since_s > scene.reaction_s:
+    return None if longest_s < max(PAUSE_S, 20.0 * usual_s) or since_s > scene.reaction_s else (since_s, longest_s)
+
+
+def recorder_paused(scene: Scene) -> Found | None:
+    """Nothing was recorded for a while."""
+    paused = pause(scene)
+    if paused is None:
         return None
+    since_s, longest_s = paused
     who = "the driver stood still" if scene.sent_any else "the recorder stood still, or its bus was cut"
     return Found(since_s, f"no frame was sent or received for {longest_s:.3f} s: {who}")
 

@@ -10,6 +10,7 @@ from typing import Final
 from canbase_driver.causes import DriverCause
 from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, TRIPPED
 from canbase_recording.cause import Found
+from canbase_recording.evidence_bus import pause
 from canbase_recording.notes import FilterNote
 from canbase_recording.scene import Scene
 from canbase_recording.trace import last_before, value_at
@@ -19,6 +20,8 @@ from canbase_runtime.stop_cause import SCAN_LOST, StopCause
 Seen = Callable[[Scene], Found | None]
 SLACK_S: Final = 0.02
 """A note is written down a little after what it is about."""
+WAKES_S: Final = 0.1
+"""A driver that stood still takes in what has waited within this time."""
 COMMANDS_LOST_S: Final = 0.15
 LEASE_LOST_S: Final = 0.15
 DIFFERS_MPS: Final = 0.02
@@ -56,14 +59,20 @@ def _first_hold(scene: Scene) -> FilterNote | None:
 
 
 def source_lost(scene: Scene) -> Found | None:
-    """The mux has no source any more, while the last one ordered motion; after a stop of the driver it ends by that."""
+    """The mux has no source any more, while the last one ordered motion; after a stop of the driver it ends by that.
+
+    What a driver takes in when it goes on after a pause shows no order of events.
+    """
+    paused = pause(scene)
+    woken_s = sum(paused) if paused is not None else -math.inf
     stops = (note.at_s for note in scene.drivers if note.state in (DriverState.STOPPING, DriverState.LATCHED))
     stopped_s = next((at_s for at_s in stops if at_s >= scene.reaction_s - SLACK_S), math.inf)
     before = ""
     for note in scene.muxes:
         if note.at_s > scene.reaction_s + SLACK_S or note.at_s >= stopped_s:
             break
-        if not note.active and before and note.at_s >= scene.reaction_s - SLACK_S:
+        is_late = woken_s - SLACK_S <= note.at_s < woken_s + WAKES_S
+        if not note.active and before and note.at_s >= scene.reaction_s - SLACK_S and not is_late:
             return Found(note.at_s, f"velocity_mux follows {before} no longer: {note.detail or 'no source'}")
         before = note.active
     return None

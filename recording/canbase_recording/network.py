@@ -15,7 +15,7 @@ from canbase_config.object_map import CONTROLWORD, STATUSWORD
 from canbase_config.robot import DRIVER_NODE_ID, WATCHDOG_NODE_ID
 from canbase_driver.cia301.frame import MAX_COB_ID, Frame
 from canbase_driver.cia301.nmt import EMCY, HEARTBEAT, NMT, SDO_TO_CLIENT, SDO_TO_SERVER, NmtCommand, NmtState
-from canbase_driver.cia301.sdo_client import abort_text
+from canbase_driver.cia301.sdo_client import NO_OBJECT, NO_SUB_INDEX, abort_text
 from canbase_driver.supervision.watchdog_link import (
     COUNTERS_COB_ID,
     RESET_COB_ID,
@@ -221,7 +221,8 @@ class Network:
         if len(node.aborts) >= MOST_ABORTS and key not in node.aborts:
             return NONE
         node.aborts[key] += 1
-        if node.aborts[key] > 1:
+        is_question = not done.is_write and done.abort in (NO_OBJECT, NO_SUB_INDEX)  # as each boot asks them
+        if is_question or node.aborts[key] > 1:
             return NONE
         name = self._decoder.known(done.node_id, done.at).name
         what = f"SDO {'write' if done.is_write else 'read'} {done.at}{f' {name}' if name else ''}"

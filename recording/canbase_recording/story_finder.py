@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Final
 
@@ -25,6 +26,8 @@ SIGNS: Final = frozenset(
 """Alarms that report, and stop nothing themselves."""
 SIGN_S: Final = 1.0
 """A sign this long before the first part acts is a story of its own [s]."""
+BACK_S: Final = 0.2
+"""A SYNC that is back for so long before anything else happens has stopped nothing."""
 LEAST_ENTRIES: Final = 200
 """So many before it belong to a stop in any case: those before a long pause."""
 MOST_STOPS: Final = 12
@@ -45,6 +48,9 @@ class StoryFinder:
         self._alarm_s = 0.0
         self._acted = False
         """Some part has acted, not only reported."""
+        self._only_sync = False
+        self._back_s = math.inf
+        """When SYNC was back, of a stop that began by its absence, and in which nothing else has happened."""
         self._off: dict[str, float] = {}
         """Axes without power, and since when [s]."""
 
@@ -68,13 +74,19 @@ class StoryFinder:
             self._on_alarm(event)
         if event.kind is EventKind.DRIVE_STATE:
             self._on_drive(event)
+        if event.kind is EventKind.SYNC_BACK and self._only_sync:
+            self._back_s = event.at_s
 
     def _on_alarm(self, event: Event) -> None:
         acts = event.kind not in SIGNS
-        if acts and not self._acted and self._began_s is not None and event.at_s - self._began_s > SIGN_S:
-            self.end(event.at_s)
+        if self._began_s is not None and not self._acted:
+            is_old = acts and event.at_s - self._began_s > SIGN_S
+            if is_old or event.at_s - self._back_s > BACK_S:
+                self.end(event.at_s)
         if self._began_s is None:
-            self._began_s, self._acted = event.at_s, False
+            self._began_s, self._acted, self._only_sync = event.at_s, False, True
+        self._only_sync = self._only_sync and event.kind is EventKind.SYNC_LOST
+        self._back_s = math.inf
         self._alarm_s = event.at_s
         self._acted = self._acted or acts
 

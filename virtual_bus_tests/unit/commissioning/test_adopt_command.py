@@ -75,3 +75,21 @@ def test_one_drive_too_many_and_one_without_lss_end_it_before_any_node_id_is_tak
     assert "robot.yaml has 1 nodes, 2 found" in done.stderr
     assert "Nothing was changed" in done.stderr
     assert settings(world) == [(1, 500_000), (2, 500_000)]
+
+
+@pytest.mark.parametrize(
+    ("few", "said"),
+    [("", "no answer to few"), ("few: no\n", "not confirmed; stopped here"), ("few: yes\n", "")],
+)
+def test_that_drives_are_missing_is_confirmed_by_a_person_and_not_by_yes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, few: str, said: str
+) -> None:
+    """The one that answers would get the node id of the other side."""
+    world = CommandWorld(tmp_path, monkeypatch, factory_fresh=True)
+    world.suffer(2, "silent")
+    answers = tmp_path / "answers.yaml"
+    answers.write_text(f"start: yes\n{few}", encoding="utf-8")
+    done = world.canbase("bus", "adopt", "--yes", "--answers", str(answers))
+    assert ("robot.yaml has 2 nodes, 1 found" in done.stdout) is (few != "")
+    assert said in done.stderr
+    assert ("node id [1] 1" in done.stdout) is (said == "")

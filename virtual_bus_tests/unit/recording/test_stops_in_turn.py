@@ -159,6 +159,31 @@ def test_a_pause_of_the_driver_is_seen_in_its_black_box_however_long_it_was(hang
     assert story.found.at_s == pytest.approx(1.0, abs=0.03)
 
 
+def test_a_short_pause_of_the_driver_before_it_hangs_is_not_the_stop() -> None:
+    """1.00 s ── SYNC away for 0.06 s ── 1.06 s ── 1.50 s ── the driver hangs."""
+    robot = Robot()
+    driver = robot.world.processes["driver"]
+    for until_s, act in ((1.0, driver.hang), (1.06, driver.go_on), (1.5, driver.hang), (4.0, driver.go_on)):
+        robot.wait(until_s - robot.recorder.now_s)
+        act("a test")
+    (story,) = stories(robot.recorder.wire)
+    assert story.cause is Cause.DRIVER_SILENT
+    assert story.found.at_s == pytest.approx(1.5, abs=0.03)
+
+
+def test_what_a_driver_takes_in_after_its_hang_is_no_source_that_was_lost() -> None:
+    notes = [
+        Note(0.1, written.mux_note("action", "")),
+        Note(3.01, written.mux_note("", "action: no message for 1.02 s (timeout 0.30 s)")),
+        Note(3.02, written.driver_note("STOPPING: watchdog tripped (watchdog: driver silent)")),
+    ]
+    frames = [RecordedFrame(at_s / 100.0, 0x080, b"") for at_s in (*range(200), *range(300, 320))]
+    entries: list[Entry] = sorted([*notes, *frames], key=lambda entry: entry.at_s)
+    (story,) = stories([Note(0.0, "motor_driver ENABLED"), *entries])
+    assert story.cause is Cause.RECORDER_PAUSED
+    assert story.found.at_s == pytest.approx(1.99)
+
+
 def test_a_source_that_ended_long_ago_is_not_lost_at_the_stop() -> None:
     """The mux reports each 0.1 s that nobody drives."""
     notes = [
