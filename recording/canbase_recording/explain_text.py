@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from canbase_config.robot import LSS_REQUEST
+from canbase_config.robot import DRIVER_NODE_ID, LSS_REQUEST, WATCHDOG_NODE_ID
 from canbase_recording.event import Event
 from canbase_recording.explanation import Explanation
 from canbase_recording.frame_words import LSS_ANSWER, is_pdo, pdo_sources
@@ -55,8 +55,16 @@ def _lines(facts: RecordingFacts, told: Explanation) -> Iterator[str]:
 
 def no_stop(told: Explanation) -> str:
     """What it means that no stop was found."""
-    if any(axis.state for node in told.network.nodes.values() for axis in node.axes.values()):
-        return "No drive lost its power in motion, and no part of canbase stopped the base."
+    network = told.network
+    ours = (DRIVER_NODE_ID, WATCHDOG_NODE_ID) if network.watchdog is not None else ()
+    others = [node for node in network.nodes.values() if node.node_id not in ours]
+    unread = [node.node_id for node in others if not any(axis.state for axis in node.axes.values())]
+    if len(unread) < len(others):
+        none = "lost its power in motion, and no part of canbase stopped the base."
+        if not unread:
+            return f"No drive {none}"
+        nodes = ", ".join(map(str, sorted(unread)))
+        return f"No drive whose statusword (6041h) can be read {none} What node {nodes} did is not known."
     return "No part of canbase stopped the base. No statusword (6041h) can be read: what the drives did is not known."
 
 

@@ -285,13 +285,15 @@ def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:
 def _refuse_heartbeat(node: NodeAccess, longest_ms: int, refusal: str) -> Steps[None]:
     """Raises BootError: it may take a longer period, which timeouts.drive_heartbeat_s allows."""
     problem = f"it takes no heartbeat period of at most {longest_ms} ms ({refusal})"
+    taken_ms = 0
     for period_ms in HEARTBEAT_PERIODS_MS:
-        if period_ms > longest_ms:
-            yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))
-            has_ms = (yield from node.read_if_present(HEARTBEAT_PRODUCER)) or 0
-            if longest_ms < has_ms <= HEARTBEAT_PERIODS_MS[-1]:
-                key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * has_ms / 1000:g}`"
-                raise BootError(node.node_id, problem, f"It keeps {has_ms} ms: set {key} in robot.yaml")
+        if period_ms > longest_ms and (yield from node.tries(Write(HEARTBEAT_PRODUCER, 0, period_ms, 2))):
+            taken_ms = period_ms
+            break
+    has_ms = (yield from node.read_if_present(HEARTBEAT_PRODUCER)) or taken_ms
+    if longest_ms < has_ms <= HEARTBEAT_PERIODS_MS[-1]:
+        key = f"`timeouts.drive_heartbeat_s: {HEARTBEATS_NEEDED * has_ms / 1000:g}`"
+        raise BootError(node.node_id, problem, f"It keeps {has_ms} ms: set {key} in robot.yaml")
     tool = f"set 1017h:0 to 1 to {longest_ms} with the manufacturer's tool"
     none = (
         f"Nor any up to {HEARTBEAT_PERIODS_MS[-1]} ms: {tool}, or, {GUARDING_ALONE}; without either it cannot be used"

@@ -195,7 +195,7 @@ class Drives:
             if node_id not in (0, node.node_id):
                 continue
             if not axis.statusword & REMOTE:
-                return f"{_place(axis)}: {LOCAL}"
+                return f"{_place(axis)} may be in local mode, which takes no commands (statusword bit 9)"
             if axis.statusword & INTERNAL_LIMIT:
                 return f"{_place(axis)}: {LIMITED}"
             if code := node.emcy_text():

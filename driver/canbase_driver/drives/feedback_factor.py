@@ -18,6 +18,8 @@ LONGEST_STEP_S = 0.1
 """Over a longer pause the velocity is no measure of the way [s]."""
 LEAST_M, ENOUGH_M = 0.001, 0.5
 """Travel by 606Ch before anything is said, and after which the scale counts as right until the next boot [m]."""
+ROLLED_M = 0.005
+"""Travel by 6064h, on balance, that no jitter at a standstill makes [m]."""
 AGREES = 0.2
 """Slopes between 1 - this and 1 + this: delays of the drive's filter are as much in the first moments."""
 LINE = 0.9
@@ -59,7 +61,7 @@ class FeedbackFactor:
     @property
     def sentence(self) -> str:
         """What contradicts what, and what to do about it; empty: they agree, or it cannot be told."""
-        if self._way_m == 0.0 and math.sqrt(self._yy) > LEAST_M:
+        if self._way_m == 0.0 and abs(self._counts * self._metres_per_count) > ROLLED_M:
             return f"{self._named(VELOCITY_ACTUAL)} stays 0 while {self._named(POSITION_ACTUAL)} counts"
         if not LEAST_M < self._way_m <= ENOUGH_M or self._xx == 0.0:
             return ""

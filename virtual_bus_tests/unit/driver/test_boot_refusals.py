@@ -326,6 +326,12 @@ def test_a_fixed_heartbeat_period_that_is_too_long_is_told_with_the_key_that_all
     assert hint in error_of(boot_one_axis(drive))
 
 
+def test_of_the_periods_that_it_takes_the_shortest_is_told_whatever_it_had() -> None:
+    drive, boot = heartbeat_of(lambda ms: ms >= 200)
+    assert "It keeps 200 ms: set `timeouts.drive_heartbeat_s: 0.4`" in error_of(boot)
+    assert drive.number(0x1017) == 200
+
+
 def test_what_cannot_be_read_is_written_all_the_same_and_proves_nothing() -> None:
     """Its own 605Ah of 0 would coast: it is set. That it took 6007h no read shows, so nothing relies on it."""
     drive = FakeDrive(refuse_read={(0x605A, 0): GENERAL_ERROR, (0x6007, 0): GENERAL_ERROR})

@@ -58,7 +58,7 @@ def test_a_few_increments_may_be_those_of_a_dead_encoder() -> None:
 
 def test_a_velocity_that_stays_zero_while_the_encoder_counts_is_told() -> None:
     assert driven(shown=lambda _mps: 0.0).sentence == "606Ch stays 0 while 6064h counts"
-    assert driven(shown=lambda _mps: 0.0, until_m=0.0005).sentence == ""
+    assert driven(shown=lambda _mps: 0.0, until_m=0.004).sentence == ""
 
 
 def test_a_velocity_of_the_other_sign_is_told_with_the_object() -> None:

@@ -243,6 +243,20 @@ def test_without_a_statusword_no_stop_found_does_not_mean_that_no_drive_stopped(
     assert "no drive lost" not in text.lower()
 
 
+def test_no_stop_found_says_nothing_of_a_node_whose_statusword_cannot_be_read() -> None:
+    """Node 2 has a TPDO that the default mapping of CiA 402 does not have: what it reports is not known."""
+    frames = [
+        RecordedFrame(0.01 * turn, cob_id, data)
+        for turn in range(100)
+        for cob_id, data in ((0x181, b"\x37\x02"), (0x182, b"\x08\x02" if turn > 50 else b"\x37\x02"), (0x382, b"abc"))
+    ]
+    text = "\n".join(text_lines(FACTS, explain(frames)))
+    assert "No drive whose statusword (6041h) can be read lost its power in motion" in text
+    assert "What node 2 did is not known." in text
+    both = [frame for frame in frames if frame.cob_id == 0x181]
+    assert "No drive lost its power in motion" in "\n".join(text_lines(FACTS, explain(both)))
+
+
 def test_a_state_that_was_reported_before_an_nmt_command_is_not_the_state_now() -> None:
     frames = [RecordedFrame(0.0, 0x705, b"\0"), RecordedFrame(0.1, 0x000, b"\x01\x00")]
     assert facts_of(explain(frames), 5) == "pre-operational before NMT start, 1 boot-ups"
