@@ -34,7 +34,8 @@ def state(view: RobotView, robot: Robot, timestamp: str, version: str = V2) -> d
 def essence(view: RobotView, robot: Robot) -> tuple[object, ...]:
     """What makes two states differ for a fleet: not the numbers in their sentences."""
     keys = tuple(error.key for error in errors(view, robot))
-    return driving(view), keys, estop(view, robot), field_violation(view, robot)
+    stops = estop(view, robot), active_emergency_stop(view, robot)
+    return driving(view), keys, stops, field_violation(view, robot)
 
 
 def line(message: dict[str, Any]) -> str:

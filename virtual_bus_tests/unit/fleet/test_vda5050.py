@@ -245,6 +245,12 @@ def test_a_change_is_one_of_states_and_not_of_numbers() -> None:
     assert seen("pressed for 0.1 s") == seen("pressed for 0.2 s")
     assert seen("") != seen("", clearance_ahead_m=0.0)
     assert essence(well(driver=driver(standstill=True)), ROBOT) != essence(well(), ROBOT)
+    stops = [
+        well(safety=safety(action=SafetyState.STOP, cause=cause, clearance_ahead_m=0.0))
+        for cause in (SafetyState.CAUSE_OBSTACLE, SafetyState.CAUSE_SHUTDOWN)
+    ]
+    assert {state(view, ROBOT, NOW, V2)["safetyState"]["eStop"] for view in stops} == {"AUTOACK"}
+    assert essence(stops[0], ROBOT) != essence(stops[1], ROBOT), "activeEmergencyStop of 3.0.0 differs"
 
 
 BAD_DRIVES = [drive("left_wheel\n", error_code=1, health="hot", boot_problem="x" * 9000)]
