@@ -159,7 +159,7 @@ def write_at(drive: Drive, index: int, value: int) -> Write:
 
 def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None]:
     """Raises BootError when the drive keeps a softer stop: its way would be longer than all others count with."""
-    for index, mps2 in _ramps_mps2(robot).items():
+    for index, mps2 in _needed_mps2(robot).items():
         set_ramp = set_vl_ramp if drive.kind.is_vl else _set_ramp
         kept = yield from set_ramp(node, drive, robot, index, mps2)
         key = STOPPING_LIMITS.get(index)
@@ -168,7 +168,7 @@ def _configure_ramps(node: NodeAccess, drive: Drive, robot: Robot) -> Steps[None
         needed, has = _needed_mps2(robot)[index], kept.mps2
         if has is None:
             value = AxisUnits(drive, robot.base).acceleration_raw(needed)
-            where = ", in a curve" if needed > getattr(robot.limits, key) else ""
+            where = ", in a curve or an emergency" if needed > getattr(robot.limits, key) else ""
             least = f"{needed:g} m/s² (limits.{key}{where}), a value of {value}{kept.what}"
             node.notes.append(
                 f"how hard {drive.joint} brakes is unknown: it must be at least {least}; "
@@ -186,11 +186,16 @@ def _slower(robot: Robot, key: str, has_mps2: float) -> str:
     """Which limits of robot.yaml fit a wheel that brakes with `has_mps2`. In a curve both decelerations add up."""
     limits = robot.limits
     if key == "deceleration_mps2":
-        share = has_mps2 / _needed_mps2(robot)[PROFILE_DECELERATION]
-        straight, turning = limits.deceleration_mps2, limits.angular_deceleration_radps2
+        straight, turning, hardest = (
+            limits.deceleration_mps2,
+            limits.angular_deceleration_radps2,
+            limits.emergency_deceleration_mps2,
+        )
+        share = min(1.0, has_mps2 / (straight + turning * robot.base.track_m / 2))
         return (
-            f"set `limits.deceleration_mps2: {_floor(share * straight):g}` and `limits.angular_deceleration_radps2: "
-            f"{_floor(share * turning):g}` in robot.yaml, where they are {straight:g} and {turning:g}"
+            f"set `limits.deceleration_mps2: {_floor(share * straight):g}`, `limits.angular_deceleration_radps2: "
+            f"{_floor(share * turning):g}` and `limits.emergency_deceleration_mps2: {_floor(min(hardest, has_mps2)):g}`"
+            f" in robot.yaml, where they are {straight:g}, {turning:g} and {hardest:g}"
         )
     text = f"set `limits.{key}: {_floor(has_mps2):g}` in robot.yaml, where it is {getattr(limits, key):g}"
     if has_mps2 < (ordinary := limits.deceleration_mps2) < getattr(limits, key):
@@ -237,18 +242,17 @@ def _refuse_coasting(node: NodeAccess, drive: Drive) -> Steps[None]:
 
 
 def _needed_mps2(robot: Robot) -> dict[int, float]:
-    """What a wheel needs at most: in a curve the ramps of both speeds add up."""
+    """What a wheel needs at most: in a curve the ramps of both speeds add up. The driver shapes the speed, in an
+    emergency too: the drive's own ramps bound a step, and must never lag behind."""
     limits, arm_m = robot.limits, robot.base.track_m / 2
+    faster = limits.acceleration_mps2 + limits.angular_acceleration_radps2 * arm_m
+    slower = limits.deceleration_mps2 + limits.angular_deceleration_radps2 * arm_m
+    hardest = limits.emergency_deceleration_mps2
     return {
-        PROFILE_ACCELERATION: limits.acceleration_mps2 + limits.angular_acceleration_radps2 * arm_m,
-        PROFILE_DECELERATION: limits.deceleration_mps2 + limits.angular_deceleration_radps2 * arm_m,
-        QUICK_STOP_DECELERATION: limits.emergency_deceleration_mps2,
+        PROFILE_ACCELERATION: max(faster, hardest),
+        PROFILE_DECELERATION: max(slower, hardest),
+        QUICK_STOP_DECELERATION: hardest,
     }
-
-
-def _ramps_mps2(robot: Robot) -> dict[int, float]:
-    """The driver shapes the speed; the drive's own ramps bound a step, and must never lag behind in a curve."""
-    return {index: max(mps2, robot.limits.emergency_deceleration_mps2) for index, mps2 in _needed_mps2(robot).items()}
 
 
 def _produce_heartbeat(node: NodeAccess, timeout_ms: int) -> Steps[None]:

@@ -82,8 +82,8 @@ def test_a_missing_option_is_a_note(index: int, sub: int, note: str) -> None:
         ),
         (
             0x6084,
-            "how hard left brakes is unknown: it must be at least 2 m/s² (limits.deceleration_mps2, in a curve), a "
-            "value of 3820 in the unit of its profile; set it with the manufacturer's tool",
+            "how hard left brakes is unknown: it must be at least 2 m/s² (limits.deceleration_mps2, in a curve or an "
+            "emergency), a value of 3820 in the unit of its profile; set it with the manufacturer's tool",
         ),
         (
             0x6085,
@@ -748,8 +748,21 @@ def test_an_ordinary_ramp_that_is_softer_than_the_driver_brakes_is_refused_too()
     drive.refuse[0x6084, 0] = 0x06090031
     said = str(error_of(boot_one_axis(drive)))
     assert "6084h:0 stays at 955: left brakes with 0.5 m/s² by it" in said
-    assert "set `limits.deceleration_mps2: 0.125` and `limits.angular_deceleration_radps2: " in said
-    assert "in robot.yaml, where they are 0.5 and " in said
+    assert "set `limits.deceleration_mps2: 0.125`, `limits.angular_deceleration_radps2: " in said
+    assert "and `limits.emergency_deceleration_mps2: 0.5` in robot.yaml, where they are 0.5, " in said
+
+
+@pytest.mark.parametrize(("kept", "boots"), [(2000, False), (2721, False), (2723, True)])
+def test_a_ramp_that_is_softer_than_the_emergency_needs_is_refused_though_a_curve_needs_less(
+    kept: int, boots: bool
+) -> None:
+    """0.5 m/s² and 0.5 rad/s² in a curve, 1.5 m/s² in an emergency: the driver shapes that ramp too."""
+    base = fake_robot()
+    calm = base.model_copy(update={"limits": base.limits.model_copy(update={"angular_deceleration_radps2": 0.5})})
+    drive = FakeDrive()
+    drive.objects[0x6084, 0] = u32(kept)
+    drive.refuse[0x6084, 0] = 0x06090031
+    assert (Bench(drive, calm).run().report is not None) is boots
 
 
 @pytest.mark.parametrize(("kept", "boots"), [(3628, False), (3631, True), (3820, True)])
