@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from canbase_config.drive import Drive, Identity
-from canbase_config.object_map import CONTROLWORD, PROFILE_402, STATUSWORD, VELOCITY_ACTUAL, place
+from canbase_config.object_map import AXIS_OFFSET, CONTROLWORD, PROFILE_402, STATUSWORD, VELOCITY_ACTUAL, place
 from canbase_config.robot import Robot
 from canbase_config.scale_objects import Expected
 from canbase_config.stopping import standstill_s
@@ -54,6 +54,8 @@ NUMBERS = ("vendor_id", "product_code", "revision", "serial")
 """1018h:1 to 1018h:4."""
 
 POLL_S = 0.02
+CONTROLWORDS = range(CONTROLWORD, CONTROLWORD + 8 * AXIS_OFFSET, AXIS_OFFSET)
+"""Of the eight axes that a node may have (CiA 402-2)."""
 BUSY_S = 2.0
 """A boot waits as long, all its writes together, for a drive whose state forbids them (0800 0022h) [s]."""
 STANDING_POLLS = 5
@@ -116,13 +118,18 @@ def _patient(steps: Steps[BootReport]) -> Steps[BootReport]:
         except SdoError as error:
             refusal = error
         is_repeated = False
-        while isinstance(step, Write) and _is_of_state(refusal) and (pauses_left > 0 or not is_repeated):
+        while _may_be_repeated(step) and _is_of_state(refusal) and (pauses_left > 0 or not is_repeated):
             is_repeated, pauses_left = True, pauses_left - 1
             yield Pause(POLL_S, f"its state to allow {step}")
             try:
                 answer, refusal = (yield step), None
             except SdoError as error:
                 refusal = error
+
+
+def _may_be_repeated(step: object) -> bool:
+    """A controlword is not: another axis waits for its own."""
+    return isinstance(step, Write) and step.index not in CONTROLWORDS
 
 
 def _is_of_state(refusal: SdoError | None) -> bool:
@@ -219,12 +226,19 @@ class _Boot:
     # -- nothing may move
 
     def _bring_to_a_stand(self) -> Steps[None]:
-        """A drive may still be running from an earlier life of its master."""
+        """A drive may still be running from an earlier life of its master. Each axis gets its quick stop, whatever
+        another one answers."""
         states: dict[str, DriveState | None] = {}
+        refused: SdoError | None = None
         for drive in self._drives:
-            states[drive.joint] = yield from _state(drive)
-            if _has_torque(states[drive.joint]):
-                yield _control(drive, Command.QUICK_STOP)
+            try:
+                states[drive.joint] = yield from _state(drive)
+                if _has_torque(states[drive.joint]):
+                    yield _control(drive, Command.QUICK_STOP)
+            except SdoError as error:
+                refused = refused or error
+        if refused is not None:
+            raise refused
         for drive in self._drives:
             if _has_torque(states[drive.joint]):
                 yield from self._wait_for_standstill(drive)

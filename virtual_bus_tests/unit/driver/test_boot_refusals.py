@@ -839,6 +839,20 @@ class Busy(FakeDrive):
         return super()._write(key, data)
 
 
+@pytest.mark.parametrize("abort", [DEVICE_STATE, INVALID])
+@pytest.mark.parametrize("refuses", [0x6040, 0x6840])
+def test_each_axis_gets_its_quick_stop_at_once_whatever_the_other_one_answers(refuses: int, abort: int) -> None:
+    """Both have power, of an earlier master."""
+    drive = FakeDrive(objects=factory_objects((0, 1)), refuse={(refuses, 0): abort})
+    drive.objects[0x6041, 0] = drive.objects[0x6841, 0] = u16(0x0237)
+    base = fake_robot()
+    bench = Bench(drive, base, base.drives)
+    assert f"{refuses:04X}h" in error_of(bench.run())
+    assert bench.now_s < 100.5
+    (other,) = {0x6040, 0x6840} - {refuses}
+    assert [value for index, _, value in drive.writes if index == other] == [0x0002]
+
+
 def test_each_write_that_the_state_of_the_drive_forbids_is_tried_again() -> None:
     drive = Busy(1)
     assert notes_of(boot_one_axis(drive)) == ()
