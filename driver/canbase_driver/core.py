@@ -311,7 +311,7 @@ class DriverCore:
         return frames
 
     def _found_clue(self, liar: int) -> str:
-        """What the driver knows about a trip of the watchdog. `liar`: whose sensors that found faulty; 0: nobody's."""
+        """What the driver knows about a trip. `liar`: the node whose sensors the watchdog found faulty; 0: none."""
         clue = self._drives.contradiction(liar) or self._drives.unshown_mode(liar)
         if clue or self.state is not DriverState.ENABLED:
             return clue  # by now the statuswords speak of the stop

@@ -37,8 +37,8 @@ def run(bus: Bus, output: Path, answers: Path | None, timeout_s: float, *, yes: 
             fail(f"{file} exists; it is never overwritten: give --output another name", WRONG_INPUT)
     person: Person = RemoteOperator() if as_json else Operator(answers, yes=yes)
     if bus.is_virtual:
-        values = "gear_ratio and velocity_unit of the robot.yaml that they run with (20 and 0.1rpm of --bench)"
-        person.tell(Tell(f"simulated drives have {values}"))
+        values = "the gear_ratio and velocity_unit of the robot.yaml that they were started with"
+        person.tell(Tell(f"The simulated drives have {values}; those of --bench have 20 and 0.1rpm"))
     with open_line(bus) as line:
         axes = _axes(line, timeout_s, person)
     if len(axes) < 2:

@@ -57,7 +57,7 @@ POLL_S = 0.02
 CONTROLWORDS = range(CONTROLWORD, CONTROLWORD + 8 * AXIS_OFFSET, AXIS_OFFSET)
 """Of the eight axes that a node may have (CiA 402-2)."""
 BUSY_S = 2.0
-"""A boot waits as long, all its writes together, for a drive whose state forbids them (0800 0022h) [s]."""
+"""So long are the pauses of one boot together, before writes that the state of the drive forbade (0800 0022h) [s]."""
 STANDING_POLLS = 5
 """A drive that stays in quick stop active is at standstill when this many polls in a row find it slow."""
 _RESETS = {"communication": NmtCommand.RESET_COMMUNICATION, "node": NmtCommand.RESET_NODE}

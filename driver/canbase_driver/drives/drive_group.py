@@ -20,14 +20,12 @@ from canbase_driver.drives.axis import Axis
 from canbase_driver.drives.canopen_node import CanopenNode, Presence
 from canbase_driver.drives.drive_snapshot import DriveSnapshot
 
-LOCAL = "it is in local mode and ignores the controlword (statusword bit 9)"
-LIMITED = "a limit in the drive is active (statusword bit 11): 607Fh, 6080h, its current limit, or the load"
 NO_CODE = "no code given: see canbase bus emcy, its display or the manufacturer's tool"
 WHY_DISABLED = {
     DriveState.SWITCH_ON_DISABLED: " (STO, main voltage?)",
     DriveState.READY_TO_SWITCH_ON: " (STO, main voltage?)",
     DriveState.SWITCHED_ON: " (an input that enables it, or a brake that opens slowly?)",
-    DriveState.QUICK_STOP_ACTIVE: " (a quick stop of its own: a limit switch or another input?)",
+    DriveState.QUICK_STOP_ACTIVE: " (it stopped by itself: a limit switch, or another input?)",
 }
 """Where to look when a drive that shall have power has this state."""
 
@@ -197,7 +195,8 @@ class Drives:
             if not axis.statusword & REMOTE:
                 return f"{_place(axis)} may be in local mode, which takes no commands (statusword bit 9)"
             if axis.statusword & INTERNAL_LIMIT:
-                return f"{_place(axis)}: {LIMITED}"
+                limits = "607Fh, 6080h, its current limit, or the load"
+                return f"{_place(axis)}: a limit in the drive is active (statusword bit 11): {limits}"
             if code := node.emcy_text():
                 return f"{_place(axis)} reports {code}"
         return ""
@@ -343,7 +342,7 @@ def _of(axis: Axis, what: str) -> str:
 def _unprepared(axis: Axis) -> str:
     if axis.state in PREPARED:
         return ""
-    local = "" if axis.statusword & REMOTE else f"; {LOCAL}"
+    local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
     return (
         f"{_place(axis)} is in {axis.state.text if axis.state else 'no state known'}; "
         f"if it stays: STO, main voltage?{local}"

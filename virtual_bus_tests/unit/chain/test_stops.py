@@ -10,6 +10,9 @@ import pytest
 from canbase_driver.motion.kinematics import Twist2D
 from canbase_driver.supervision.stop_history import StopReport, standstill_text
 from canbase_runtime.driver_state import DriverState
+from canbase_sim import faults
+from canbase_sim.cia402 import axis
+from canbase_sim.cia402.states import Bit
 from canbase_sim.faults import KINDS
 from canbase_watchdog.watchdog import State
 from support.chain_world import World
@@ -53,6 +56,26 @@ def test_a_boot_up_message_in_motion_stops_the_drive_that_sent_it_too(nodes: tup
     ]
     assert b"\x02\x00" in [data[:2] for data in stopped]
     assert world.sent(SYNC, world.now_s - 0.05)
+
+
+# --- what a drive says about itself when the watchdog trips
+
+
+@pytest.mark.parametrize("is_about_motion", [True, False])
+def test_a_trip_about_motion_names_a_drive_in_local_mode_and_another_trip_does_not(
+    is_about_motion: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0.3 m/s ── bit 9 of the statuswords falls, and an encoder or the leases end ── trip; 1 s later it is the same."""
+    world = driving()
+    monkeypatch.setattr(axis, "_ALWAYS", int(Bit.VOLTAGE_ENABLED))
+    world.leases = is_about_motion
+    if is_about_motion:
+        faults.apply(world.bench.nodes, 1, "encoder_lost", world.now_s, {})
+    assert world.run(1.0, lambda: world.core.state is DriverState.STOPPING)
+    for _ in range(2):
+        assert world.core.finding.detail.startswith("watchdog: ")
+        assert ("left_wheel (node 1) may be in local mode" in world.core.finding.detail) is is_about_motion
+        world.run(1.0)
 
 
 # --- values that stop coming

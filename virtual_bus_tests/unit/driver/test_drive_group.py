@@ -101,6 +101,12 @@ def test_who_is_not_enabled_is_named(story: Story, word: int, state: str) -> Non
     assert story.drives.disabled() == f"right_wheel (node 2) is {state}"
 
 
+def test_an_emcy_of_the_wheel_that_does_not_follow_is_told(story: Story) -> None:
+    story.drives.nodes[1].emcy = Emcy(2, 0x8250, 0x20, b"")
+    assert story.drives.not_following(1) == ""
+    assert story.drives.not_following(2).startswith("right_wheel (node 2) reports 8250h")
+
+
 @pytest.mark.parametrize(
     ("left", "right", "node_id", "said"),
     [
