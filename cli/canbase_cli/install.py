@@ -27,7 +27,7 @@ class Network(str, Enum):
 PrefixOption = Annotated[
     Path, typer.Option("--prefix", metavar="DIR", help="Write below DIR, an image's root; run no command.")
 ]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Print the steps, do nothing.")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Print the steps and what refuses them; change nothing.")]
 
 
 def install(
@@ -89,6 +89,7 @@ def install(
     )
 
     loaded = load_config(config) if config else _installed(prefix / owner_paths(name or "robot")[0].relative_to("/"))
+    executor = Executor(prefix, typer.echo, dry_run=dry_run)
     try:
         request = Request(
             name=name or loaded.robot.name,
@@ -111,6 +112,8 @@ def install(
         installed = manifests(prefix)
         others = neighbours(prefix, request.name, installed)
         plan = install_plan(request, installed, others)
+        if dry_run:
+            executor.carry_out(plan)  # shows the steps, also where a check below refuses them
         if prefix == Path("/"):
             refuse_running(request.name, left_interfaces(request, installed, others))
             if sros2:
@@ -118,11 +121,10 @@ def install(
             outside = [name for name in loaded.files if Path(name).is_absolute()]
             refuse_others([python, *folders(request.sourced), *outside])  # before anything of it runs
             refuse_others(rehearse(python, request.sourced, relay=loaded.robot.watchdog.relay is not None))
+        if not dry_run:
+            executor.carry_out(plan)
     except InstallError as error:
         fail(str(error), WRONG_INPUT)
-    executor = Executor(prefix, typer.echo, dry_run=dry_run)
-    try:
-        executor.carry_out(plan)
     except ExecuteError as error:
         fail(str(error), FAILED)
     if warning := network_warning(request, environment(prefix, request.name)):

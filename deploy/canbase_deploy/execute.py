@@ -17,6 +17,8 @@ from canbase_deploy.actions import Action, Existing, FirstRecords, Link, Remove,
 from canbase_deploy.owner import ETC, old
 
 COMMAND_S = 60.0
+WOULD = {"wrote": "write", "replaced": "replace", "linked": "link", "removed": "remove", "ran": "run", "made": "make"}
+"""A dry run reports what it would do."""
 
 
 class ExecuteError(RuntimeError):
@@ -60,13 +62,13 @@ class Executor:
         if there == action.text:
             self._tell("as it was", action.path)
         elif there is not None and action.existing is Existing.KEEP:
-            self._tell("kept     ", action.path)
+            self._tell("kept", action.path)
             return
         elif there is not None and action.existing is Existing.BACK_UP:
-            self._tell("replaced ", action.path, f"the old one is {action.path.name}.old")
+            self._tell("replaced", action.path, f"the old one is {action.path.name}.old")
             self._put(self._below(old(action.path)), there, action)
         else:
-            self._tell("wrote    ", action.path)
+            self._tell("wrote", action.path)
         if there != action.text:
             self.changed.add(action.path)
         self._put(path, action.text, action)
@@ -94,7 +96,7 @@ class Executor:
         if path.is_symlink() and os.readlink(path) == action.target:
             self._tell("as it was", action.path)
             return
-        self._tell("linked   ", action.path)
+        self._tell("linked", action.path)
         if not self._dry_run:
             self._make_folder(path.parent)
             path.unlink(missing_ok=True)
@@ -104,7 +106,7 @@ class Executor:
         path = self._below(action.path)
         if not (path.is_symlink() or path.exists()):
             return
-        self._tell("removed  ", action.path)
+        self._tell("removed", action.path)
         if self._dry_run:
             return
         self._make_folder(path.parent)
@@ -116,7 +118,7 @@ class Executor:
     def _run(self, action: Run) -> None:
         if self._prefix != Path("/"):
             return
-        self._say(f"ran       {' '.join(action.argv)}")
+        self._tell("ran", " ".join(action.argv))
         if self._dry_run:
             return
         try:
@@ -131,15 +133,17 @@ class Executor:
             return
         folder = Path(action.folder)
         if folder.exists() if self._dry_run else not first_records(folder, action.robot, action.user):
-            self._tell("kept     ", action.folder)
+            self._tell("kept", action.folder)
         else:
-            self._tell("made     ", action.folder, "no stop is latched")
+            self._tell("made", action.folder, "no stop is latched")
 
     def _below(self, path: PurePosixPath) -> Path:
         return self._prefix / path.relative_to("/")
 
-    def _tell(self, what: str, path: PurePosixPath, more: str = "") -> None:
-        self._say(f"{what} {path}" + (f" ({more})" if more else ""))
+    def _tell(self, what: str, subject: object, more: str = "") -> None:
+        if self._dry_run:
+            what = f"would {WOULD[what]:7}" if what in WOULD else f"{what:13}"
+        self._say(f"{what:9} {subject}" + (f" ({more})" if more else ""))
 
 
 def first_records(folder: Path, robot: str, user: str) -> bool:

@@ -183,7 +183,8 @@ def test_a_dry_run_changes_nothing(tmp_path: Path) -> None:
     Executor(tmp_path, said.append, dry_run=True).carry_out(install_plan(request(), {}))
 
     assert files_below(tmp_path) == []
-    assert "wrote     /etc/canbase/example.yaml" in said
+    assert "would write   /etc/canbase/example.yaml" in said
+    assert {line.split()[0] for line in said} == {"would"}
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:

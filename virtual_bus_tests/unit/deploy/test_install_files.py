@@ -82,7 +82,7 @@ def test_files_of_twist_mux_are_named_too(robot: Path, root: Path) -> None:
 def test_a_dry_run_tells_of_them(robot: Path, root: Path) -> None:
     _, said = install(root, "--config", str(robot), "--dry-run")
 
-    assert "wrote     /etc/canbase/drives/mine.yaml" in said
+    assert "would write   /etc/canbase/drives/mine.yaml" in said
     assert not root.exists()
 
 

@@ -236,4 +236,5 @@ def test_a_python_of_a_user_is_not_run_before_it_is_refused(tmp_path: Path) -> N
 
     assert done.exit_code == 2
     assert f"{python} belongs to the user 54321: sudo chown -R root:root {python}" in done.output
+    assert "would write   /etc/canbase/example.yaml" in done.output
     assert not (tmp_path / "ran").exists()
