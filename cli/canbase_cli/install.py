@@ -123,10 +123,8 @@ def install(
             refuse_others(rehearse(python, request.sourced, relay=loaded.robot.watchdog.relay is not None))
         if not dry_run:
             executor.carry_out(plan)
-    except InstallError as error:
-        fail(str(error), WRONG_INPUT)
-    except ExecuteError as error:
-        fail(str(error), FAILED)
+    except (InstallError, ExecuteError) as error:
+        fail(str(error), WRONG_INPUT if isinstance(error, InstallError) else FAILED)
     if warning := network_warning(request, environment(prefix, request.name)):
         typer.secho(warning, err=True, fg=typer.colors.YELLOW, color=colour())
     if not dry_run and prefix == Path("/"):
