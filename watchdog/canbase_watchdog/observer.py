@@ -374,7 +374,7 @@ class Observer:
 
     def _on_quick_stop(self, node_id: int, data: bytes, now_s: float) -> bool:
         self._note_foreign(
-            node_id, f"the watchdog's quick stop PDO with {data.hex(' ')} (stop frames at a unit's end do that)", now_s
+            node_id, f"quick stop PDO with {data.hex(' ')} (sent as well when driver or watchdog has ended)", now_s
         )
         return True
 

@@ -391,7 +391,7 @@ def _foreign_master(view: View, config: WatchdogConfig, now_s: float) -> Verdict
 
 
 _OF_A_SIGN = {
-    None: "another master is on the bus: {}",
+    None: "another master or process commands the drives: {}",
     False: (
         "another master is on the bus, or frames are sent again: {}. Our frames have no copies within 2 ms: find the "
         "other master (canbase bus scan) and stop it. If there is none, take out the gateway, the bridge or the second "

@@ -82,10 +82,15 @@ def test_every_cause_of_the_watchdog_has_words_at_the_driver() -> None:
         TripCause.DRIVER_SILENT,
         TripCause.DRIVE_SILENT,
         TripCause.FEEDBACK_IMPLAUSIBLE,
+        TripCause.FOREIGN_MASTER,
     ],
 )
 def test_causes_have_the_same_names(cause: TripCause) -> None:
-    assert watchdog_link.CAUSES[cause] == cause.name.lower().replace("_", " ")
+    assert watchdog_link.CAUSES[cause].partition(",")[0] == cause.name.lower().replace("_", " ")
+
+
+def test_stop_frames_of_canbase_itself_are_not_blamed_on_another_master() -> None:
+    assert "stop frames after a part of canbase ended" in watchdog_link.CAUSES[TripCause.FOREIGN_MASTER]
 
 
 def test_the_watchdog_reads_the_reset_request_that_the_driver_writes() -> None:

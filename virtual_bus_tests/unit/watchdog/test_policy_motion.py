@@ -323,7 +323,9 @@ def test_a_sign_of_another_master_counts_for_a_second_while_a_drive_is_enabled(a
 
 def test_the_sign_is_told() -> None:
     verdict = decide(of(AT_REST, foreign=Sign(NOW, 2, "NMT command 1")), CONFIG, NOW)
-    assert verdict == Verdict(TripCause.FOREIGN_MASTER, 2, "another master is on the bus: NMT command 1")
+    assert verdict == Verdict(
+        TripCause.FOREIGN_MASTER, 2, "another master or process commands the drives: NMT command 1"
+    )
     assert not stands(verdict, of(OFF), CONFIG, NOW)
 
 

@@ -290,7 +290,7 @@ def test_what_is_no_command_to_an_enabled_drive(cob_id: int, data: str) -> None:
 
 
 def test_the_quick_stop_pdo_is_ours_alone() -> None:
-    detail = "the watchdog's quick stop PDO with 0f 00 (stop frames at a unit's end do that), while it is enabled"
+    detail = "quick stop PDO with 0f 00 (sent as well when driver or watchdog has ended), while it is enabled"
     assert after(0x501, "0f 00") == Sign(2.0, 1, detail)
 
 
