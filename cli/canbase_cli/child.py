@@ -12,6 +12,8 @@ import sys
 
 PR_SET_PDEATHSIG = 1
 """prctl(2); kept over execve(2)."""
+CHILD = "CANBASE_CHILD"
+"""In the environment of a part: its parent prints the warnings of robot.yaml, and the watchdog that of priority."""
 
 
 def end_with(parent_pid: int, part: str = "") -> None:
@@ -26,6 +28,7 @@ def end_with(parent_pid: int, part: str = "") -> None:
 
 if __name__ == "__main__":
     end_with(int(sys.argv.pop(1)), sys.argv[2])
+    os.environ[CHILD] = sys.argv[2]
     from canbase_cli.entry import main
 
     main()

@@ -13,6 +13,8 @@ from typing import Final
 
 import typer
 
+from canbase_cli.child import CHILD
+
 PRIORITY: Final = {"sim": 45, "driver": 37, "velocity": 35, "action-server": 30}
 """SCHED_FIFO, 1 to 99. The watchdog has 40: above all that it watches, below the simulated drives, which stand in for
 hardware. No two alike: under FIFO one that is busy would hold up another of its priority. Below 50, where the
@@ -26,7 +28,8 @@ THREADS: Final = Path("/proc/self/task")
 
 
 def raise_priority(part: str) -> None:
-    """Of all threads that this process has, and of those that they start. Where it is not allowed, it logs one line.
+    """Of all threads that this process has, and of those that they start. Where it is not allowed, it logs one
+    line, and none as a part of `canbase up`: that of the watchdog speaks for all.
 
     For a process that is ready to run: one that is still starting, above others, would hold them up for a second where
     processors are few, and the mux would take a late message of a joystick for its release.
@@ -38,4 +41,5 @@ def raise_priority(part: str) -> None:
                 os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(PRIORITY[part]))
     except (OSError, AttributeError, ValueError) as error:
         hint = "it may be late on a loaded computer; the service needs LimitRTPRIO"
-        typer.echo(f"canbase {part}: no real-time priority ({error}): {hint}", err=True)
+        if CHILD not in os.environ:
+            typer.echo(f"canbase {part}: no real-time priority ({error}): {hint}", err=True)

@@ -17,6 +17,7 @@ from canbase_base.latch_file import create_first
 from canbase_base.latch_folder import latch_folder
 from canbase_base.own_folder import replaced
 from canbase_base.single_instance import TakenError, bus_name, check
+from canbase_cli.child import CHILD
 from canbase_cli.options import (
     ROS_USAGE,
     BenchOption,
@@ -222,7 +223,7 @@ def _robot_named(config: Path | None, *, bench: bool = False) -> Robot:
     path = named(config, bench=bench)
     if path is None and not os.environ.get(VARIABLE):
         fail(_UNNAMED, WRONG_INPUT)
-    return load_config(path).robot
+    return load_config(path, quiet=CHILD in os.environ).robot
 
 
 def add_services(app: typer.Typer) -> None:

@@ -14,6 +14,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from canbase_cli import services
+from canbase_cli.child import CHILD
 from canbase_cli.main import app
 from canbase_cli.options import RosCommand, ros_needed
 from canbase_config.derive import watchdog_config
@@ -365,3 +367,15 @@ def test_any_other_error_of_a_ros_command_is_its_own() -> None:
     ros_app = typer.Typer()
     ros_app.command(cls=RosCommand)(begin)
     assert isinstance(CliRunner().invoke(ros_app, []).exception, ValueError)
+
+
+def test_a_part_of_canbase_up_does_not_repeat_the_warnings_of_robot_yaml(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    warned = []
+    for part in ("", "driver"):
+        monkeypatch.setenv(CHILD, part) if part else monkeypatch.delenv(CHILD, raising=False)
+        services._robot_named(sample("example_can0"))
+        warned.append("warning:" in capsys.readouterr().err)
+
+    assert warned == [True, False]

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from canbase_cli import raise_priority as priority
+from canbase_cli.child import CHILD
 
 
 @pytest.fixture
@@ -42,6 +43,10 @@ def test_where_it_is_forbidden_one_line_says_so(
 
     monkeypatch.setattr(os, "sched_setscheduler", forbidden)
 
+    monkeypatch.delenv(CHILD, raising=False)
     priority.raise_priority("driver")
 
     assert capsys.readouterr().err.count("canbase driver: no real-time priority") == 1
+    monkeypatch.setenv(CHILD, "driver")
+    priority.raise_priority("driver")
+    assert capsys.readouterr().err == ""
