@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from canbase_runtime.log_budget import LogBudget
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.source_standing import IGNORED, SourceStanding
 from canbase_runtime.stop_cause import StopCause
@@ -16,7 +17,9 @@ from canbase_velocity.safety_filter import ScanState
 LogLine = tuple[str, Priority, dict[str, str]]
 
 AGAIN_S: Final = 10.0
-"""Scans that are dropped all the time are reported again after this time [s]."""
+"""What goes on all the time, such as scans that are dropped, is reported again after this time [s]."""
+REPEATS: Final = 6.0
+"""So many times a change of the mux is reported before it counts as going on all the time."""
 STOP_PRIORITY: Final = {
     StopCause.OBSTACLE: Priority.NOTICE,
     StopCause.OBSTACLE_NEAR: Priority.NOTICE,
@@ -45,6 +48,22 @@ def changes(before: MuxDecision, now: MuxDecision) -> Iterator[LogLine]:
         sentence = f"{now.sentence}; before: {before.active or 'none'}{why}" if other else now.sentence
         fields = {"active": now.active or "", "before": before.active or ""}
         yield sentence, Priority.NOTICE if locked else Priority.INFO, fields
+
+
+class Repeats:
+    """Thins out the lines of a source that is slower than its timeout, or of a lock that is set again and again."""
+
+    def __init__(self) -> None:
+        self._budgets: dict[tuple[str, ...], LogBudget] = {}
+
+    def thinned(self, lines: Iterator[LogLine], now_s: float) -> Iterator[LogLine]:
+        """Those to write at `now_s` [s, monotonic]; one that was left out is counted in the next one of its kind."""
+        for sentence, priority, fields in lines:
+            budget = self._budgets.setdefault(tuple(fields.values()), LogBudget(REPEATS, 1.0 / AGAIN_S))
+            omitted = budget.take(now_s)
+            if omitted is not None:
+                count = f" ({omitted} times more since the last such line)" if omitted else ""
+                yield sentence + count, priority, fields
 
 
 class DropTeller:

@@ -34,7 +34,7 @@ from canbase_runtime.serialized_message import SerializedTwist
 from canbase_runtime.sim_time import refuse_sim_time
 from canbase_runtime.wrong_start import WrongStartError
 from canbase_velocity.base_ready import status_timeout_s
-from canbase_velocity.changes import changes
+from canbase_velocity.changes import Repeats, changes
 from canbase_velocity.delay import Sent
 from canbase_velocity.graph import expected, heard, publishers
 from canbase_velocity.input_ring import Note, forget, mux_entry
@@ -77,6 +77,7 @@ class MuxNode(Node):
         self._note = note
         self._follower: Follower | None = None
         self._event_log = EventLog(self.get_logger(), Journal("velocity_mux"))
+        self._repeats = Repeats()
         self._receive_times = ReceiveTimes()
         self._mux = Mux(
             robot.mux.sources,
@@ -241,7 +242,7 @@ class MuxNode(Node):
         if decision.essence != self._decision.essence or now_s >= self._state_due_s:
             self._states.publish(mux_state(decision, stamp))
             self._state_due_s = next_turn(self._state_due_s, now_s, STATE_PERIOD_S)
-        for sentence, priority, fields in changes(self._decision, decision):
+        for sentence, priority, fields in self._repeats.thinned(changes(self._decision, decision), now_s):
             self._event_log.write(sentence, priority, robot=self._robot.name, **fields)
         self._decision = decision
 

@@ -9,7 +9,7 @@ import pytest
 from canbase_config.mux import MuxLock, MuxSource
 from canbase_runtime.log_priority import Priority
 from canbase_runtime.stop_cause import StopCause
-from canbase_velocity.changes import DropTeller, changed_order, changes, is_told
+from canbase_velocity.changes import DropTeller, Repeats, changed_order, changes, is_told
 from canbase_velocity.decision import Action, Decision
 from canbase_velocity.safety_filter import ScanState
 from canbase_velocity.twist import ZERO, Twist
@@ -37,6 +37,24 @@ def test_from_first_command_to_silence() -> None:
     ((sentence, priority, fields),) = changes(nav, silent)
     assert sentence == "no active source; before: nav (no message for 0.60 s (timeout 0.50 s))"
     assert (priority, fields) == (Priority.INFO, {"active": "", "before": "nav"})
+
+
+def test_a_source_that_is_slower_than_its_timeout_does_not_flood_the_log() -> None:
+    mux, repeats = rested(SOURCES, LOCKS), Repeats()
+    before, written = mux.decide(0.0), []
+    for tenth in range(10, 610):  # a message each 0.7 s, its timeout is 0.5 s
+        now_s = tenth / 10.0
+        if tenth % 7 == 0:
+            mux.accept_command("nav", FORWARD, now_s)
+        now = mux.decide(now_s)
+        written += [sentence for sentence, _, _ in repeats.thinned(changes(before, now), now_s)]
+        before = now
+
+    assert written[0] == "nav drives; before: none"
+    assert 2 * 11 <= len(written) <= 2 * 12  # of each kind six at once, then one each 10 s
+    assert "times more since the last such line)" in written[-1]
+    gate = [("lock gate holds", Priority.NOTICE, {"lock": "gate", "lock_holds": "true"})]
+    assert list(repeats.thinned(iter(gate), 61.0)) == gate
 
 
 def test_a_lock_is_a_notice_and_so_is_what_it_takes_away() -> None:
