@@ -33,6 +33,11 @@ class Schema:
         required = tuple(shape.get("required", ()))
         return required + tuple(key for key in shape.get("properties", ()) if key not in required)
 
+    def is_free(self, loc: Loc) -> bool:
+        """Whether `loc` is a mapping whose keys the user chooses."""
+        shape = self.shape_at(loc)
+        return bool(shape.get("additionalProperties") or shape.get("patternProperties"))
+
     def homes(self, key: str) -> tuple[str, ...]:
         """The sections that have `key`: `limits`, `drives[…]`, `mux.sources.…`; `` is the top of the file."""
         return tuple(path for path, keys in self.sections if key in keys)

@@ -138,6 +138,8 @@ def _key_hint(key: str, section: Loc, schema: Schema) -> str:
     if not any(hints):
         hints.append(_near_elsewhere(key, schema))
     if not any(hints) and here:
+        free = [".".join(map(str, (*section, name, key))) for name in here if schema.is_free((*section, name))]
+        hints += [f"did you mean {' or '.join(free)}?"] if free else []
         hints.append("the keys here are " + ", ".join(here))
     return " ".join(hint for hint in hints if hint)
 

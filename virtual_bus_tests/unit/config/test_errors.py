@@ -97,6 +97,11 @@ BROKEN: dict[str, tuple[dict[int, str], str]] = {
         {35: "  socket: /tmp/lease.sock\n  colour: red"},
         ":36: lease.colour: unknown key\n    the keys here are socket, uid",
     ),
+    "a key of a free section inside": (
+        {3: "  channel: can0\n  port: 43113"},
+        ":4: bus.port: unknown key\n    did you mean bus.extra.port? the keys here are interface, channel, bitrate, "
+        "sync_counter, extra",
+    ),
     "a missing key": (
         {19: ""},
         ":17: base.track_m: missing, expected a number > 0.02 and <= 5 "
