@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -14,13 +14,22 @@ from canbase_cli.goal import (
     JsonOption,
     WaitOption,
     run_goal,
+    value_and_unit,
 )
 from canbase_cli.options import NamespaceOption, right_start, ros_arguments, ros_needed
+
+_UNITS_M: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def distance_m(text: str) -> float:
+    """`1.0`, `1m` or `50cm` in metres. Raises typer.BadParameter for other words."""
+    value, unit = value_and_unit("DISTANCE", text, tuple(_UNITS_M), "1.0, 1m or 50cm")
+    return value * _UNITS_M.get(unit, 1.0)
 
 
 def drive(
     ctx: typer.Context,
-    distance_m: Annotated[float, typer.Argument(metavar="DISTANCE", help="in m, negative: backward")],
+    distance: Annotated[str, typer.Argument(metavar="DISTANCE", help="in m, or 50cm; negative: backward")],
     speed_mps: Annotated[float, typer.Option("--speed", "-s", metavar="SPEED", help="highest speed, m/s")] = 0.2,
     cancel_after_s: CancelAfterOption = None,
     wait_s: WaitOption = 5.0,
@@ -35,6 +44,7 @@ def drive(
     Exit codes: 0 succeeded, 1 other failures, 2 wrong command line, 3 canceled, 4 aborted, 5 rejected, 6 the server is
     not found, has ended, or does not answer, 7 canceled because no feedback arrived.
     """
+    wanted_m = distance_m(distance)
     with ros_needed():
         import rclpy
         from rclpy.signals import SignalHandlerOptions
@@ -49,13 +59,13 @@ def drive(
             client = DriveClient(node, feedback_timeout_s=feedback_timeout_s)
             run_goal(
                 lambda show, interrupted: client.send(
-                    distance_m,
+                    wanted_m,
                     speed_mps,
                     on_feedback=lambda feedback: show(feedback.traveled_m, feedback.remaining_m),
                     discovery_timeout_s=wait_s,
                     interrupted=interrupted,
                 ),
-                distance_m,
+                wanted_m,
                 "m",
                 cancel_after_s,
                 as_json,

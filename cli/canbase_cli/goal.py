@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -63,10 +64,20 @@ WITHOUT_SERVER: Final = (
     "(mux.sources, 0.3 s by default). If only this computer is cut off, the goal goes on: `canbase stop`"
 )
 
+_VALUE: Final = re.compile(r"([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)\s*([a-z°]*)", re.IGNORECASE)
 _SIGNED_WITH_UNIT: Final = re.compile(r"-[0-9.]+[a-zA-Z°]+")
 
 Show = Callable[[float, float], None]
 """Called with what is done (signed) and what is left, in the goal's unit."""
+
+
+def value_and_unit(name: str, text: str, units: Sequence[str], such_as: str) -> tuple[float, str]:
+    """`90deg` as 90.0 and deg; without a unit it is empty. Raises typer.BadParameter for other words."""
+    match = _VALUE.fullmatch(text.strip())
+    with suppress(ValueError):  # 1.2.3
+        if match and match[2].lower() in ("", *units) and math.isfinite(value := float(match[1])):
+            return value, match[2].lower()
+    raise typer.BadParameter(f"{name} is {text!r}, expected a number such as {such_as}")
 
 
 class GoalCommand(RosCommand):

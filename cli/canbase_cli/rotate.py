@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
@@ -16,10 +15,9 @@ from canbase_cli.goal import (
     JsonOption,
     WaitOption,
     run_goal,
+    value_and_unit,
 )
 from canbase_cli.options import NamespaceOption, right_start, ros_arguments, ros_needed
-
-_ANGLE: Final = re.compile(r"([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)\s*(rad|deg|°|)", re.IGNORECASE)
 
 
 def angle_rad(text: str, degrees: bool) -> float:
@@ -27,14 +25,8 @@ def angle_rad(text: str, degrees: bool) -> float:
 
     Raises typer.BadParameter for other words, and for a bare number of radians beyond a full turn: `90` is a slip.
     """
-    match = _ANGLE.fullmatch(text.strip())
-    try:
-        value = float(match[1]) if match else math.nan
-    except ValueError:  # 1.2.3
-        value = math.nan
-    if match is None or not math.isfinite(value):
-        raise typer.BadParameter(f"ANGLE is {text!r}, expected a number such as 1.57, 1.57rad or 90deg")
-    unit = match[2].lower() or ("deg" if degrees else "")
+    value, unit = value_and_unit("ANGLE", text, ("rad", "deg", "°"), "1.57, 1.57rad or 90deg")
+    unit = unit or ("deg" if degrees else "")
     if not unit and abs(value) > math.tau:
         turns = abs(value) / math.tau
         raise typer.BadParameter(f"ANGLE {text} is {turns:.1f} turns in radians; write {text}deg or {text}rad")

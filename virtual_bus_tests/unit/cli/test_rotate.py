@@ -1,4 +1,4 @@
-"""The angle of `canbase rotate`: its unit, and what is refused before anything moves."""
+"""The angle of `canbase rotate`, the distance of `canbase drive`: units, and what is refused before anything moves."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from canbase_cli.drive import distance_m
 from canbase_cli.main import app
 from canbase_cli.rotate import angle_rad
 
@@ -40,6 +41,20 @@ def test_radians_beyond_a_full_turn_need_their_unit(text: str) -> None:
 def test_what_is_no_angle_is_refused(text: str) -> None:
     with pytest.raises(typer.BadParameter, match="expected a number such as"):
         angle_rad(text, degrees=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "metres"), [("1", 1.0), ("-0.5", -0.5), ("1m", 1.0), ("-50cm", -0.5), ("20 MM", 0.02), ("1e-1m", 0.1)]
+)
+def test_a_distance_may_have_a_unit(text: str, metres: float) -> None:
+    assert distance_m(text) == pytest.approx(metres)
+
+
+@pytest.mark.parametrize("text", ["", "far", "nan", "1km", "1rad", "1.2.3", "1,5"])
+def test_what_is_no_distance_is_refused(text: str) -> None:
+    done = CliRunner().invoke(app, ["drive", text])
+    assert done.exit_code == 2
+    assert "expected a number such as 1.0, 1m or 50cm" in " ".join(done.output.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("words", [["-90degg"], ["-90degg", "--speed", "1"], ["--json", "-90degg"]])
