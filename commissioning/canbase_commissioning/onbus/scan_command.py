@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict
+from typing import Final
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -91,14 +92,19 @@ def _print(rows: list[ScanRow], as_json: bool) -> None:
         Console().print(_table(rows))
 
 
+_BROKEN: Final = ("what", "heartbeat", "identity")
+"""Columns that a narrow terminal breaks; the names in the others are whole, because people copy them."""
+
+
 def _table(rows: list[ScanRow]) -> Table:
     title = f"{len(rows)} nodes; identity: vendor:product:revision:serial (1018h, hexadecimal)"
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, collapse_padding=True, pad_edge=False)
     for column in ("node", "what", "state", "heartbeat", "profile", "identity", "robot.yaml"):
-        table.add_column(column, overflow="fold")
+        table.add_column(column, overflow="fold", no_wrap=column not in _BROKEN)
     for row in rows:
         identity = ":".join("–" if n is None else f"{n:X}" for n in _identity(row))
-        cells = (str(row.node_id), row.what, row.nmt_state, row.heartbeat, row.profile or "–", identity, row.in_robot)
+        joints = row.in_robot.replace(", ", "\n")
+        cells = (str(row.node_id), row.what, row.nmt_state, row.heartbeat, row.profile or "–", identity, joints)
         table.add_row(*(Text(cell) for cell in cells))
     return table
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from canbase_commissioning.onbus.scan_command import _print
+from canbase_commissioning.scan_rows import ScanRow
 from support.command_world import CommandWorld, canbase
 
 
@@ -23,6 +25,15 @@ def test_it_finds_both_drives_and_says_what_they_are(world: CommandWorld) -> Non
     assert "node 1, 2: answers SDO and sends nothing; its heartbeat is off (1017h = 0)" in done.stderr
     assert "canbase simulated drive" in table.stdout
     assert "\x1b[" not in table.stdout
+
+
+def test_eighty_columns_break_no_name(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    what, state = "canbase simulated drive (CiA 402 drive)", "pre-operational"
+    joints = "front_right_wheel, rear_right_wheel"
+    _print([ScanRow(2, what, state, "100 ms", "maxon_epos4", 0xFB, 0x61500000, 0x1700000, 7, "", joints)], False)
+    words = capsys.readouterr().out.split()
+    assert {state, "maxon_epos4", "front_right_wheel", "rear_right_wheel"} <= set(words)
 
 
 def test_two_drives_with_one_node_id_are_named_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
