@@ -50,41 +50,41 @@ def inject(
 
     `continue` ends a hang. After `kill` start `canbase up` again. `canbase inject all heal` ends the faults of drives.
 
-    Faults of a drive:
+    Faults of a drive, with their parameters and defaults; for a drive with two axes also axis=0 or 1:
 
     - aliases: 29-bit frames that look like its own
-    - blocked: something holds its wheel, with force_n [N]
-    - bus_off: its controller leaves the bus for off_s
+    - blocked: something holds its wheel; force_n=1e6 [N]
+    - bus_off: its controller leaves the bus; off_s=0.2
     - cut: sends and receives nothing
     - deaf: receives nothing
     - encoder_frozen: the encoder counts nothing, 606Ch keeps its last value
-    - encoder_ghost: the encoder counts nothing, 606Ch shows residue_mps
-    - encoder_intermittent: the encoder counts nothing for off_s, then all for on_s
-    - encoder_jumping: the encoder jumps by jump_m each every_s
+    - encoder_ghost: the encoder counts nothing, 606Ch shows residue_mps=0.003
+    - encoder_intermittent: the encoder counts nothing for off_s=0.1, then all for on_s=0 (0: as off_s)
+    - encoder_jumping: the encoder jumps; jump_m=0.01, every_s=0.02
     - encoder_lost: the encoder counts nothing, 606Ch is 0
     - encoder_reversed: the encoder counts backward
-    - encoder_scaled: the encoder counts factor times the motion
+    - encoder_scaled: the encoder counts a part of the motion; factor=0.5
     - encoder_zero: as encoder_lost, and 6064h is 0
     - extra_boot_up: one boot-up message too many
-    - fault: a drive fault with code (603Fh); holds=true: it stays
+    - fault: a drive fault; code=29445 (603Fh), holds=false (true: it stays)
     - frozen_encoder: 6064h alone keeps its value
     - guard_stuck: its answers to node guarding keep their toggle bit
     - heal: ends all of them; a drive fault still needs a reset
     - ignores_setpoints: keeps its last velocity
-    - limited: the motor gets a share of each setpoint
+    - limited: the motor gets a share of each setpoint; share=0.5
     - mute_boot: its boot-up messages are lost
     - no_mains: no main voltage
     - no_requests: remote frames do not reach it
-    - power_cycle: no supply for off_s
+    - power_cycle: no supply; off_s=0.5
     - reset_node: restarts, as by NMT
-    - rpdo_lost: setpoints of one axis are lost; every=N: each N-th arrives
+    - rpdo_lost: setpoints of one axis are lost; every=0 (N: each N-th arrives)
     - short_emcy: EMCY of three bytes
     - silent: sends nothing
     - sto: no torque (STO)
-    - stuck_velocity: 606Ch keeps its value, or is raw
+    - stuck_velocity: 606Ch keeps its value; raw=N: it has this one
     - tpdo_lost: feedback of one axis is lost
-    - unbraked: reports its stops, and brakes with a share of their slopes
-    - weak: the motor has a share of its force
+    - unbraked: reports its stops, and brakes with a share of their slopes; share=0
+    - weak: the motor has a share of its force; share=0
 
     Exit codes: 0 done, 1 the target does not run or the simulator refuses, 2 wrong command line or robot.yaml.
     """

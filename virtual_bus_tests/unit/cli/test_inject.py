@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 import re
 import socket
 import threading
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -16,6 +19,7 @@ from canbase_cli.main import app
 from canbase_config.load import load_robot, sample, samples
 from canbase_sim.control import control_path
 from canbase_sim.faults import KINDS
+from canbase_sim.plant.encoder import EncoderFault
 
 
 def canbase(*words: str) -> tuple[int, str]:
@@ -88,6 +92,22 @@ def test_what_it_refuses(robot: Path, words: list[str], code: int, says: str) ->
 def test_help_lists_each_fault_of_a_drive() -> None:
     listed = re.findall(r"^ +- (\w+): \S", inject.__doc__ or "", re.MULTILINE)
     assert listed == sorted(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_help_has_the_parameters_of_a_fault_and_their_defaults(kind: str) -> None:
+    do, takes = KINDS[kind]
+    fixed = inspect.getclosurevars(do).nonlocals.get("fixed", {})
+    defaults = {field.name: field.default for field in fields(EncoderFault)} | fixed
+    defaults |= {name: given.default for name, given in inspect.signature(do).parameters.items()}
+    line = next(line for line in (inject.__doc__ or "").splitlines() if line.strip().startswith(f"- {kind}: "))
+
+    told = dict(re.findall(r"(\w+)=([\w.]+)", line))
+
+    assert set(told) == takes - {"axis"}
+    assert {name: json.loads(value) for name, value in told.items() if value != "N"} == {
+        name: defaults[name] for name in told if defaults[name] is not None
+    }
 
 
 def test_nothing_is_broken_on_a_real_bus(tmp_path: Path) -> None:
