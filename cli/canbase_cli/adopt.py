@@ -37,7 +37,7 @@ def adopt(
         bool, typer.Option("--set-link", help="Set the bit rate of a SocketCAN interface by ip link; needs root.")
     ] = False,
     answers: Annotated[
-        Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for tests.")
+        Path | None, typer.Option("--answers", metavar="FILE", help="YAML with answers by key, for scripts.")
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Confirm, and take the proposed node ids.")] = False,
 ) -> None:
@@ -47,6 +47,9 @@ def adopt(
     another master is on the bus. Then it finds every drive by its serial number, also when several have one node id,
     and asks which node id each shall have. All change the bit rate at once; each setting is verified, then stored.
     Before that a power cycle brings back the old settings. Ctrl-C leaves the drives in LSS waiting.
+
+    Keys of --answers: start (--yes confirms it), serial_N (hexadecimal): node id, few: go on although drives
+    are missing.
 
     Exit codes: 0 all drives ready, 1 not, 2 wrong command line or robot.yaml, 130 Ctrl-C.
     """

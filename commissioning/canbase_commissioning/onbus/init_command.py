@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from canbase_commissioning.bus_monitor import OURS, Listener
@@ -13,9 +14,9 @@ from canbase_commissioning.guide import Ask, CommissionError, Tell
 from canbase_commissioning.identification import Identification
 from canbase_commissioning.onbus.bus_session import BusSession, open_line
 from canbase_commissioning.onbus.moving import refuse_beside_masters
-from canbase_commissioning.onbus.operator import BACK, Operator, Person
+from canbase_commissioning.onbus.operator import BACK, NoAnswerError, Operator, Person
 from canbase_commissioning.onbus.remote_operator import RemoteOperator
-from canbase_commissioning.robot_draft import Draft, Questions, ask_about, robot_yaml
+from canbase_commissioning.robot_draft import UNITS, Draft, Questions, ask_about, robot_yaml
 from canbase_commissioning.scan_rows import twins_advice
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.errors import ConfigError
@@ -94,15 +95,21 @@ def answered_draft(axes: Sequence[FoundAxis], person: Person) -> Draft:
     """The answers of the person; BACK returns to the question before. Raises CommissionError."""
     person.tell(Tell(f"Enter takes the value in [brackets]; {BACK} returns to the question before"))
     given: list[object] = []
+    missing: list[Ask] = []
     while True:
-        draft = _asked(ask_about(axes), given, person)
+        draft = _asked(ask_about(axes), given, missing, person)
+        if missing:
+            raise NoAnswerError(*missing)
         if draft is not None:
             return draft
         given.pop()
 
 
-def _asked(questions: Questions, given: list[object], person: Person) -> Draft | None:
-    """Asks what is not `given` yet, and notes the answers there. None: the person wants to go back."""
+def _asked(questions: Questions, given: list[object], missing: list[Ask], person: Person) -> Draft | None:
+    """Asks what is not `given` yet, and notes the answers there. None: the person wants to go back.
+
+    Without a terminal it notes the questions without an answer in `missing`, and the draft is none.
+    """
     known = list(given)
     answer: object = None
     while True:
@@ -119,16 +126,28 @@ def _asked(questions: Questions, given: list[object], person: Person) -> Draft |
         elif known:
             answer = known.pop(0)
         else:
-            answer = _answer(step, person, is_first=not given)
+            answer = _answer(step, person, missing, is_first=not given)
             if answer == BACK:
                 return None
             given.append(answer)
 
 
-def _answer(question: Ask, person: Person, *, is_first: bool) -> object:
+def _stand_in(question: Ask) -> object:
+    """Any answer that the question takes."""
+    for text in filter(None, (question.default, "1", *UNITS)):
+        with suppress(ValueError):
+            return question.check(text)
+    raise NoAnswerError(question)
+
+
+def _answer(question: Ask, person: Person, missing: list[Ask], *, is_first: bool) -> object:
     """What the answer means, or BACK."""
     while True:
-        text = person.ask(question, lambda: time.sleep(THINKING_S))
+        try:
+            text = person.ask(question, lambda: time.sleep(THINKING_S))
+        except NoAnswerError:
+            missing.append(question)
+            return _stand_in(question)
         try:
             if text != BACK:
                 return question.check(text)

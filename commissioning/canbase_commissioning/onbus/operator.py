@@ -93,6 +93,18 @@ def answered(person: Person, question: Ask, turn: Callable[[], None]) -> object:
             person.again(question, error)
 
 
+class NoAnswerError(CommissionError):
+    """Nobody is there to answer these questions."""
+
+    def __init__(self, *questions: Ask) -> None:
+        keys = [question.key for question in questions]
+        rest = [question.key for question in questions if not question.confirms and question.default is None]
+        remedy = "run it on a terminal, " + ("" if rest else "with --yes, ") + "or give it in --answers"
+        by_yes = f"; --yes answers all but {', '.join(rest)}" if rest and len(rest) < len(keys) else ""
+        super().__init__(f"no answer to {', '.join(keys)}: {remedy}{by_yes}")
+        self.questions = questions
+
+
 class Operator:
     """Prompts on the terminal, or takes the answers of a file; `yes` confirms what wants a yes, and takes defaults."""
 
@@ -119,7 +131,7 @@ class Operator:
             typer.echo(f"{_asked(question)} {known}")
             return known
         if not self._has_terminal:
-            raise CommissionError(f"no answer to {question.key}: run it on a terminal, or give it in --answers")
+            raise NoAnswerError(question)
         typer.secho(f"{_asked(question)} ", bold=True, nl=False, color=colour())
         while not _has_line():
             turn()

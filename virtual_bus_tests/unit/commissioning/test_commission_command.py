@@ -124,6 +124,6 @@ def test_without_an_answer_or_a_robot_it_ends_with_advice(world: CommandWorld) -
     assert world.canbase("setup", "commission", "--steps", "dance").exit_code == 2
     done = world.canbase("setup", "commission")
     assert done.exit_code == 1
-    assert "no answer to wheels_up: run it on a terminal, or give it in --answers" in done.stderr
+    assert "no answer to wheels_up: run it on a terminal, with --yes, or give it in --answers" in done.stderr
     world.config.unlink()
     assert world.canbase("setup", "commission").exit_code == 2

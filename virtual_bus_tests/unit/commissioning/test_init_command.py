@@ -44,7 +44,11 @@ def test_two_drives_become_a_robot_yaml_that_passes_the_check(world: CommandWorl
 def test_a_question_without_an_answer_writes_nothing(world: CommandWorld, output: Path) -> None:
     done = world.canbase("setup", "init", "--output", str(output), "--yes")
     assert done.exit_code == 1
-    assert "no answer to node1.gear_ratio: run it on a terminal, or give it in --answers" in done.stderr
+    missing = "node1.gear_ratio, node1.velocity_unit, node2.gear_ratio, node2.velocity_unit, scanner.x_m"
+    assert f"no answer to {missing}: run it on a terminal, or give it in --answers" in done.stderr
+    some = world.canbase("setup", "init", "--output", str(output)).stderr
+    assert "no answer to name, node1.side, node1.gear_ratio, " in some
+    assert some.endswith(f", estop: run it on a terminal, or give it in --answers; --yes answers all but {missing}\n")
     assert list(output.parent.glob("new.yaml*")) == []
 
 
