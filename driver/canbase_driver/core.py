@@ -305,7 +305,7 @@ class DriverCore:
         if outcome is not None and outcome.done:
             self._stop_requested = False
             self._state_machine.reset()
-            self._drives.forget_emcys()
+            self._drives.forget_reports()
         if outcome is not None:
             self._reset.end(outcome)
         return frames
@@ -357,6 +357,7 @@ class DriverCore:
             commanded=self._command.motion(now_s) if with_motion else "",
             unproven="" if enabled else self._without_self_stop(),
             stalled=drives.stalled(),
+            wrapping=drives.wrapping(),
             overdue=self._overdue(now_s),
             standstill=stand,
             turning=drives.turning(now_s) if with_motion and not stand else "",

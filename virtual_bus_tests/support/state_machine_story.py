@@ -37,6 +37,7 @@ WRONG: dict[str, Situation] = {
     "resetting": Situation(resetting=True),
     "drive disabled": Situation(disabled="left is switched on"),
     "stalled": Situation(stalled="left stalls"),
+    "feedback implausible": Situation(wrapping="left wraps"),
     "did not stop": Situation(overdue="left turns"),
     "command not zero": Situation(commanded="0.3 m/s"),
     "not standing": Situation(standstill=False, turning="left turns"),

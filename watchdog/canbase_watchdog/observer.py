@@ -259,7 +259,7 @@ class Observer:
         if len(data) != 1:
             return False
         self._heartbeat_at[node_id] = self._last_frame_at[node_id] = now_s
-        self._operational[node_id] = data[0] == frames.OPERATIONAL
+        self._operational[node_id] = data[0] & ~frames.TOGGLE == frames.OPERATIONAL  # some set bit 7 in heartbeats
         if data == frames.BOOT_UP and self._is_enabled(node_id, now_s):
             self._boot_up_at[node_id] = now_s
         return True

@@ -57,10 +57,16 @@ def _check_range(node: NodeAccess, drive: Drive) -> Steps[None]:
         f"{index:04X}h lets 6064h of {drive.joint} wrap between {limits[0]} and {limits[1]}, each {turns:g} "
         "revolutions of the wheel, and the pose of the odometry is reset there"
     )
-    tool = f"set {index:04X}h:1 to -2147483648 and {index:04X}h:2 to 2147483647 with the manufacturer's tool"
+    tool = whole_range(drive)
     if turns < LEAST_TURNS:
         raise BootError(node.node_id, problem, f"The whole range of 6064h: {tool}")
     node.notes.append(f"{problem}: {tool}")
+
+
+def whole_range(drive: Drive) -> str:
+    """What to do about a position that wraps."""
+    at = f"{POSITION_RANGE + _offset(drive):04X}h"
+    return f"set {at}:1 to -2147483648 and {at}:2 to 2147483647 with the manufacturer's tool"
 
 
 def check_expected(node: NodeAccess, drive: Drive) -> Steps[None]:

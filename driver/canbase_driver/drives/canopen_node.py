@@ -25,7 +25,7 @@ from canbase_driver.boot.steps import BootTimes
 from canbase_driver.cia301.emcy import Emcy, parse_emcy
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import ALL_NODES, NmtCommand, NmtState, nmt, parse_heartbeat
-from canbase_driver.cia301.node_guarding import GuardAnswers
+from canbase_driver.cia301.node_guarding import GuardAnswers, without_toggle
 from canbase_driver.cia301.pdo import node_layout
 from canbase_driver.cia402 import DriveState, PowerGoal, common_controlword, next_controlword
 from canbase_driver.drives.axis import Axis
@@ -333,7 +333,7 @@ class CanopenNode:
 
     def on_heartbeat(self, frame: Frame, now_s: float) -> bool:
         """Take a frame 700h + id. False: neither a heartbeat nor an answer to node guarding that counts."""
-        heartbeat = frame if self._guarded is None else self._guarded.take_answer(frame)
+        heartbeat = without_toggle(frame) if self._guarded is None else self._guarded.take_answer(frame)
         parsed = None if heartbeat is None else parse_heartbeat(heartbeat)
         if heartbeat is None or parsed is None or parsed[1] is None:
             return False

@@ -11,6 +11,8 @@ from functools import partial
 
 from canbase_config.bus_load import values_bits_per_s
 from canbase_config.robot import Robot
+from canbase_driver.boot.advice import ELSE_UNUSABLE
+from canbase_driver.boot.scale_check import whole_range
 from canbase_driver.boot.sdo_budget import SdoBudget
 from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.frame import Frame
@@ -132,7 +134,7 @@ class Drives:
 
     def unprepared(self) -> str:
         """Which axis is not switched on yet, and the likely reason."""
-        return _first(_unprepared(axis) for axis in self.axes)
+        return _first(_unprepared(node, axis) for node, axis in self._with_node)
 
     def are_fresh(self, now_s: float) -> bool:
         """Every axis has given all its values in time."""
@@ -165,6 +167,17 @@ class Drives:
         for axis in self.axes:
             if axis.stall.is_over:
                 return _of(axis, axis.stall.sentence)
+        return ""
+
+    def wrapping(self) -> str:
+        """Which wheel's position wraps within less than its 32 bits, so that the odometry misses travel."""
+        for axis in self.axes:
+            if counts := axis.travel.wraps_by:
+                about = f"{float(f'{counts:.2g}'):.0f}"
+                return (
+                    f"{_place(axis)}: 6064h has jumped twice by about {about} counts: it wraps there, and the odometry "
+                    f"misses travel. Let it count in 32 bits: {whole_range(axis.drive)}; {ELSE_UNUSABLE}"
+                )
         return ""
 
     def stalling(self, node_id: int) -> str:
@@ -232,10 +245,12 @@ class Drives:
                 return False
         return True
 
-    def forget_emcys(self) -> None:
+    def forget_reports(self) -> None:
         """After a reset: what the drives reported before it is no news any more; some never take it back."""
         for node in self.nodes:
             node.forget_emcy()
+        for axis in self.axes:
+            axis.travel.forget_jumps()
 
     def losses(self) -> int:
         """How often the travel of some wheel went on from a new reference, since the start."""
@@ -339,14 +354,14 @@ def _of(axis: Axis, what: str) -> str:
     return f"{axis.drive.joint} {what}" if what else ""
 
 
-def _unprepared(axis: Axis) -> str:
+def _unprepared(node: CanopenNode, axis: Axis) -> str:
     if axis.state in PREPARED:
         return ""
     local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
-    return (
-        f"{_place(axis)} is in {axis.state.text if axis.state else 'no state known'}; "
-        f"if it stays: STO, main voltage?{local}"
-    )
+    reports = f"; it reports {code}" if (code := node.emcy_text()) else ""
+    why = "see its display" if axis.state is DriveState.NOT_READY_TO_SWITCH_ON else "STO, main voltage?"
+    state = axis.state.text if axis.state else "no state known"
+    return f"{_place(axis)} is in {state}; if it stays: {why}{reports}{local}"
 
 
 def _disabled(axis: Axis) -> str:

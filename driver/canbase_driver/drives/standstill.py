@@ -77,11 +77,15 @@ class Stillness:
         return self._lie or ("" if self._follows else self._sudden)
 
     def unproven(self, now_s: float) -> str:
-        """Why the sensors do not prove standstill, what to do about it, and how long that takes."""
+        """Why the sensors do not prove standstill, what to do about it, and how long that takes.
+
+        Without a statusword the time has not begun: the watchdog lets the drive boot once its own wait is over.
+        """
         limit_s = self._limits.coasting_s
         left_s = limit_s - max(now_s - self._off_since, 0.0)
         todo = f"; repair it, and wait until its power has been off for {limit_s:.0f} s" if self._lie else ""
-        return f"{self.doubt}{todo} ({max(math.ceil(left_s), 0)} s left)"
+        left = f"{max(math.ceil(left_s), 0)} s left" if self._off_since < math.inf else f"up to {2.0 * limit_s:.0f} s"
+        return f"{self.doubt}{todo} ({left})"
 
     def pause(self) -> None:
         """Samples did not come for a while. What the wheel rolled meanwhile the encoder has counted."""

@@ -45,6 +45,7 @@ class WheelTravel:
     stay at the new place, the counter stays there: that place becomes the new reference, the travel goes on
     from where it was, and `losses` counts it, as the travel of those samples is unknown. After such a jump no gap
     of more than `DOUBTED_CYCLES` is bridged any more: the first sample after it is a new reference as well.
+    Two jumps in a row by the same way are those of a counter that wraps: `wraps_by`.
     """
 
     __slots__ = (
@@ -52,11 +53,13 @@ class WheelTravel:
         "_accepted_raw",
         "_counts",
         "_doubted",
+        "_jump_counts",
         "_max_step_counts",
         "_metres_per_count",
         "_suspect_raw",
         "_suspects",
         "losses",
+        "wraps_by",
     )
 
     def __init__(self, metres_per_count: float, max_step_counts: float) -> None:
@@ -79,6 +82,11 @@ class WheelTravel:
         self._doubted = False
         self.losses = 0
         """References that were lost, since start: each time the travel misses what happened meanwhile."""
+        self.forget_jumps()
+
+    def forget_jumps(self) -> None:
+        """After a reset: a counter that wraps shows it again."""
+        self._jump_counts = self.wraps_by = 0
 
     @property
     def travel_m(self) -> float:
@@ -96,6 +104,7 @@ class WheelTravel:
         self._accepted_raw = None
         self._suspects = 0
         self._doubted = False
+        self.forget_jumps()
 
     def update(self, raw: int, cycles: int = 1) -> float:
         """Take in a new sample; the travel after it [m]. `cycles`: control cycles since the sample before, from 1."""
@@ -129,7 +138,15 @@ class WheelTravel:
         self._suspect_raw = raw
         if self._suspects >= RE_REFERENCE_SAMPLES:
             self._doubted = True
+            self._note_jump(raw)
             self._lose(raw)
+
+    def _note_jump(self, raw: int) -> None:
+        jump_counts = unwrap(self._accepted_raw or 0, raw)
+        alike = self._is_near(self._jump_counts, jump_counts, self._accepted_cycles)
+        if alike and not self._is_near(0, jump_counts, 2 * self._accepted_cycles):
+            self.wraps_by = abs(jump_counts)
+        self._jump_counts = jump_counts
 
     def _lose(self, raw: int) -> None:
         self.losses += 1

@@ -84,7 +84,7 @@ BREAKS: dict[ResetPhase, tuple[Callable[[Situation], str], ...]] = {
 def refusal(situation: Situation, stopped: bool) -> str | None:
     """Why a reset may not even begin; None when it may. `stopped`: the state machine has taken all power away."""
     if not stopped:
-        return "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
+        return "refused: the drives have power: a stop is under way, or the robot is enabled and needs no reset"
     problem = _first(REFUSALS, situation)
     return f"refused: {problem}" if problem else None
 

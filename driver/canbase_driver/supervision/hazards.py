@@ -84,6 +84,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(DriverCause.WATCHDOG_MISSING, _MISSING, False, True, "reset, with the watchdog alive"),
     Hazard(DriverCause.DRIVE_DISABLED, lambda s: s.disabled, True, True, "reset"),
     Hazard(DriverCause.STALLED, lambda s: s.stalled, True, True, "reset, with the wheel free to turn"),
+    Hazard(DriverCause.FEEDBACK_IMPLAUSIBLE, lambda s: s.wrapping, False, True, "reset"),
     Hazard(DriverCause.DID_NOT_STOP, lambda s: s.overdue, True, True, "reset"),
     Hazard(DriverCause.STOP_REQUESTED, _stop_requested, False, True, "reset"),
     Hazard(DriverCause.INACTIVE, lambda s: s.inactive, False, False, "lifecycle transition activate"),

@@ -26,6 +26,7 @@ class Situation:
     watchdog_about_drive: bool = False  # it tripped because a drive sent nothing or was down
     commanded: str = ""  # a fresh command orders motion
     stalled: str = ""  # much torque, no speed, though motion is ordered
+    wrapping: str = ""  # a position wraps, and the odometry misses travel
     overdue: str = ""  # zero was ordered, and the wheels still turn
     standstill: bool = True  # measured, on all wheels
     turning: str = ""  # which wheel does not stand

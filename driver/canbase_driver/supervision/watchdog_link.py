@@ -34,7 +34,7 @@ CAUSES = {
     5: "motion outside the envelope",
     6: "overspeed",
     7: "drive in fault or off while another moves",
-    8: "foreign master, or stop frames after a part of canbase ended",
+    8: "foreign master, or stop frames of canbase itself",
     9: "bus failed",
     10: "own loop late",
     11: "shut down while a wheel turned",

@@ -199,7 +199,7 @@ def test_a_reset_is_refused_while_there_is_power(world: World) -> None:
     assert not outcome.done
     assert (
         outcome.sentence
-        == "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
+        == "refused: the drives have power: a stop is under way, or the robot is enabled and needs no reset"
     )
     assert world.core.state is DriverState.ENABLED
 

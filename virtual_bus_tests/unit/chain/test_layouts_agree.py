@@ -90,7 +90,7 @@ def test_causes_have_the_same_names(cause: TripCause) -> None:
 
 
 def test_stop_frames_of_canbase_itself_are_not_blamed_on_another_master() -> None:
-    assert "stop frames after a part of canbase ended" in watchdog_link.CAUSES[TripCause.FOREIGN_MASTER]
+    assert "stop frames of canbase itself" in watchdog_link.CAUSES[TripCause.FOREIGN_MASTER]
 
 
 def test_the_watchdog_reads_the_reset_request_that_the_driver_writes() -> None:

@@ -8,6 +8,7 @@ import math
 import pytest
 
 from canbase_config.robot import Robot
+from canbase_driver.causes import DriverCause
 from canbase_driver.cia301.frame import Frame
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.motion.kinematics import Twist2D
@@ -126,6 +127,19 @@ def test_an_encoder_that_jumps_for_good_is_no_motion_of_the_base_and_is_reported
     assert after.odometry.pose.yaw_rad == pytest.approx(before.odometry.pose.yaw_rad, abs=0.01)
     assert after.odometry.travel_losses == 1
     assert after.odometry.valid
+
+
+def test_a_counter_that_wraps_stops_the_base_at_the_second_time(world: World) -> None:
+    """The pose would miss travel each 0.5 m, and no navigation would know."""
+    for wraps in range(2):
+        assert world.snapshot.state is DriverState.ENABLED, wraps
+        world.node.axes[0].encoder_offset -= 1 << 16
+        world.run(1.0)
+    finding = world.snapshot.finding
+    assert (world.snapshot.state, finding.cause) == (DriverState.LATCHED, DriverCause.FEEDBACK_IMPLAUSIBLE)
+    assert "6064h has jumped twice" in finding.detail
+    assert world.powered == [False, False]
+    assert world.recovered()
 
 
 def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -> None:

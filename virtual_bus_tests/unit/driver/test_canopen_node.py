@@ -380,7 +380,14 @@ def test_a_restart_forgets_the_emergency_message_of_the_life_before() -> None:
     assert story.node.emcy is None
 
 
-@pytest.mark.parametrize("data", ["", "05 00", "63"])
+def test_a_heartbeat_whose_reserved_bit_is_set_counts() -> None:
+    story = Story().ready()
+    story.now_s += 0.05
+    assert story.node.on_heartbeat(Frame(0x701, b"\x85"), story.now_s)
+    assert (story.node.presence, story.node.heartbeat_at) == (READY, story.now_s)
+
+
+@pytest.mark.parametrize("data", ["", "05 00", "63", "80"])
 def test_what_is_no_heartbeat_is_refused_and_changes_nothing(data: str) -> None:
     story = Story().ready()
     beat_at = story.node.heartbeat_at

@@ -142,11 +142,37 @@ def test_a_fault_is_named_with_the_code_that_the_drive_gave(story: Story, word: 
     assert story.drives.fault() == "right_wheel (node 2): 7305h encoder"
 
 
+@pytest.mark.parametrize(
+    ("word", "emcy", "said"),
+    [
+        (0x0640, None, "switch on disabled; if it stays: STO, main voltage?"),
+        (0x0640, Emcy(2, 0xFF90, 0x80, b""), "switch on disabled; if it stays: STO, main voltage?; it reports FF90h"),
+        (0x0600, None, "not ready to switch on; if it stays: see its display"),
+        (0x0440, None, "switch on disabled; if it stays: STO, main voltage?; it is in local mode"),
+    ],
+)
+def test_a_drive_that_is_not_switched_on_is_told_with_where_to_look(
+    story: Story, word: int, emcy: Emcy | None, said: str
+) -> None:
+    story.drives.nodes[1].emcy = emcy
+    story.say(1, word)
+    assert story.drives.unprepared().startswith(f"right_wheel (node 2) is in {said}")
+
+
+def test_a_position_that_wraps_is_told_until_a_reset(story: Story) -> None:
+    travel = story.drives.axes[1].travel
+    assert story.drives.wrapping() == ""
+    travel.wraps_by = 64_321
+    assert story.drives.wrapping().startswith("right_wheel (node 2): 6064h has jumped twice by about 64000 counts")
+    story.drives.forget_reports()
+    assert story.drives.wrapping() == ""
+
+
 def test_an_emergency_message_alone_is_no_fault_and_goes_with_a_reset(story: Story) -> None:
     story.drives.nodes[1].emcy = Emcy(2, 0x7305, 0x20, b"")
     assert story.drives.fault() == ""
     assert story.drives.snapshots(10.0)[1].error_text == "encoder"
-    story.drives.forget_emcys()
+    story.drives.forget_reports()
     assert story.drives.snapshots(10.0)[1].error_code == 0
 
 

@@ -106,7 +106,7 @@ def test_it_may_begin_with(situation: Situation) -> None:
 
 def test_it_may_not_begin_while_there_is_power() -> None:
     assert refusal(WELL, stopped=False) == (
-        "refused: the drives have power; an enabled robot needs no reset. `canbase stop` takes the power off"
+        "refused: the drives have power: a stop is under way, or the robot is enabled and needs no reset"
     )
 
 

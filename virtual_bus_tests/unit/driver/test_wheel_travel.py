@@ -1,6 +1,7 @@
 """From raw 32-bit positions to travel: unwrapping, the first sample, power cycles, and jumps that are no motion."""
 
 import math
+from collections.abc import Iterable
 
 import pytest
 from hypothesis import given, settings
@@ -127,6 +128,45 @@ def test_a_counter_that_has_moved_for_good_becomes_the_new_reference_at_the_thir
     assert travel.referenced
     assert travel.losses == 1
     assert travel.update(10 + jump + 10) == pytest.approx(0.015)
+
+
+COUNTER = 400
+"""A counter of so many counts, seen at 15 counts a cycle: a jump is accepted at its third sample."""
+
+
+@pytest.mark.parametrize(
+    ("counts", "wraps_by"),
+    [
+        (range(0, 2 * COUNTER - 30, 15), 0),  # one jump may be anything
+        (range(0, 2 * COUNTER + 60, 15), 355),
+        (range(0, -2 * COUNTER - 60, -15), 355),
+        ((*range(0, 450, 15), *range(450, 0, -15)), 0),  # there and back over the place where it wraps
+    ],
+)
+def test_two_jumps_by_the_same_way_are_those_of_a_counter_that_wraps(counts: Iterable[int], wraps_by: int) -> None:
+    travel = wheel(*(count % COUNTER for count in counts))
+    assert travel.wraps_by == pytest.approx(wraps_by, abs=10)
+    travel.forget_jumps()
+    assert travel.wraps_by == 0
+
+
+@pytest.mark.parametrize(("jumps", "wraps"), [((200, 200), True), ((200, 260), True), ((200, 265), False)])
+def test_jumps_are_alike_within_what_the_wheel_can_have_done_meanwhile(jumps: tuple[int, int], wraps: bool) -> None:
+    first, both = jumps[0], sum(jumps)
+    assert bool(wheel(0, *(first,) * 4, *(both,) * 3).wraps_by) is wraps
+
+
+@pytest.mark.parametrize(("jump", "wraps"), [(120, False), (121, True)])
+def test_jumps_that_are_hardly_any_are_no_wrap(jump: int, wraps: bool) -> None:
+    assert bool(wheel(0, *(jump,) * 4, *(2 * jump,) * 3).wraps_by) is wraps
+
+
+def test_a_jump_of_another_life_of_the_drive_counts_no_more() -> None:
+    travel = wheel(0, *(200,) * 4)
+    travel.reset_reference()
+    for raw in (0, *(200,) * 3):
+        travel.update(raw)
+    assert (travel.losses, travel.wraps_by) == (3, 0)
 
 
 @pytest.mark.parametrize(("cycles", "travel_m", "losses"), [(10, 0.020, 1), (11, 0.010, 2), (6000, 0.010, 2)])

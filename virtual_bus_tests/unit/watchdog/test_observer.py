@@ -296,12 +296,14 @@ def test_runs_of_syncs(gap_s: float, since: float) -> None:
     assert (look(it).sync_at, look(it).sync_since) == (1.0 + gap_s, since)
 
 
-def test_heartbeats() -> None:
+@pytest.mark.parametrize(("state", "operational"), [(0x05, True), (0x85, True), (0x7F, False), (0x04, False)])
+def test_heartbeats(state: int, operational: bool) -> None:
     it = observer()
-    it.on_frame(0x701, b"\x05", 1.0)
+    it.on_frame(0x701, bytes([state]), 1.0)
     it.on_frame(0x77F, b"\x05", 2.0)
     view = look(it)
     assert (node(it, 1).heartbeat_at, node(it, 1).last_frame_at, view.driver_at) == (1.0, 1.0, 2.0)
+    assert node(it, 1).operational is operational
 
 
 @pytest.mark.parametrize(
