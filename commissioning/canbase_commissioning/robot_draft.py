@@ -25,6 +25,7 @@ MOST_AXES: Final = 8
 FULL_TURN_S: Final = 2.5
 """A turn on the spot takes at least this long: the limit of the turning speed is drafted from it."""
 UNITS: Final = get_args(VelocityUnit)
+HEAD: Final = "# Written by canbase setup init. `canbase config check` prints it with every key that it leaves out.\n"
 NAME: Final = TypeAdapter(Name)
 
 
@@ -184,15 +185,16 @@ def _yes_or_no(text: str) -> bool:
 def robot_yaml(sample: str, draft: Draft, bus: Bus) -> str:
     """The text of a robot.yaml: `sample`, a file that comes with canbase, with its comments and these values.
 
-    The drives are written anew. Accelerations stay those of the sample.
+    The drives and the first lines are written anew. Accelerations stay those of the sample.
     """
-    before, drives, after = _around_drives(sample)
+    before, drives, after = _around_drives(f"{HEAD}{sample[sample.index('# Lengths in m') :]}")
     values: list[tuple[tuple[str, ...], Any]] = [
         (("name",), draft.name),
         (("bus", "interface"), bus.interface),
         (("bus", "channel"), bus.channel),
         *([] if bus.is_virtual else [(("bus", "bitrate"), bus.bitrate)]),
         *([(("bus", "extra"), dict(bus.extra))] if bus.extra else []),
+        *([(("lease", "socket"), f"$XDG_RUNTIME_DIR/canbase-{draft.name}/lease.sock")] if bus.is_virtual else []),
         (("base", "wheel_radius_m"), draft.wheel_radius_m),
         (("base", "track_m"), draft.track_m),
         (("limits", "linear_mps"), draft.linear_mps),

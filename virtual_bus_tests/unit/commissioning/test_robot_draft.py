@@ -84,6 +84,15 @@ def test_the_comments_of_the_sample_stay(tmp_path: Path) -> None:
     assert "CANopen node id as set on the drive" not in text, "the drives of the sample are gone"
 
 
+def test_neither_the_lease_socket_nor_the_words_about_the_bench_are_in_a_new_robot(tmp_path: Path) -> None:
+    draft, _ = answer(two())
+    robot = loaded(tmp_path, draft, Bus(interface="udp_multicast", channel="239.74.163.9", extra={}), "bench").robot
+    text = (tmp_path / "robot.yaml").read_text(encoding="utf-8")
+    assert f"canbase-{draft.name}/lease.sock" in str(robot.lease.socket)
+    assert "bench" not in text
+    assert text.startswith("# Written by canbase setup init")
+
+
 @pytest.mark.parametrize("profile", profile_names())
 @pytest.mark.parametrize("bus", [CAN0, Bus(interface="udp_multicast", channel="239.74.163.9", extra={})])
 def test_every_kind_of_drive_gives_a_robot_that_passes_the_check(tmp_path: Path, profile: str, bus: Bus) -> None:

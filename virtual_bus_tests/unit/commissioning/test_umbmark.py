@@ -229,7 +229,8 @@ def test_a_scanner_whose_pose_comes_from_tf_is_refused_before_anything_open_squa
     text = sample("bench").read_text(encoding="utf-8")
     file.write_text(
         text.replace(
-            "    required: false               # the bench has no laser", "    required: false\n    pose: tf # "
+            "    required: false               # true: nothing moves without a laser",
+            "    required: false\n    pose: tf # ",
         )
     )
     code, output = called(str(file))
