@@ -120,7 +120,8 @@ class Reset:
 
     def _watchdog(self, situation: Situation, answer: int | None, now_s: float) -> RequestOutcome | None:
         if answer is not None and answer not in ACCEPTED:
-            about = f" ({situation.watchdog_detail})" if situation.watchdog_detail else ""
+            cause = situation.watchdog_detail.partition(";")[0]  # clues of the driver follow
+            about = f" ({cause})" if cause else ""
             return RequestOutcome(False, f"the watchdog{about} refused: {ANSWERS.get(answer, f'answer {answer}')}")
         if answer is not None and situation.watchdog is WatchdogView.OK:
             self._go(ResetPhase.DRIVES, now_s)

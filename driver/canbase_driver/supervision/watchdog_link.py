@@ -58,8 +58,8 @@ DRIVE_CAUSES = (3, 7, 18)
 """What the driver sees at its drives itself, and can report in more detail."""
 ANSWERS = {
     1: "reset done",
-    2: "its cause persists, or a wheel is not proven to be at standstill (with a lost encoder: wait until its power "
-    "has been off for as long as it may roll, some seconds); `canbase doctor` names which, and what to do",
+    2: "its cause persists, or a wheel is not proven to be at standstill. After a lost encoder, reset again when its "
+    "power has been off for as long as it may roll (some seconds). `canbase doctor` names what remains",
     3: "a velocity is ordered; release the joystick or cancel the goal, then reset",
     4: "not tripped",
 }

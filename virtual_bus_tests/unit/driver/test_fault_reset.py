@@ -129,6 +129,8 @@ def test_with_nothing_else_wrong_it_is_done_two_cycles_after_the_watchdogs_answe
 )
 def test_what_the_watchdog_refuses_is_refused(answer: int, why: str) -> None:
     assert sentence(Story().run(TRIPPED, 0.01, answer)) == f"the watchdog (lease lost) refused: {why}"
+    clues = replace(TRIPPED, watchdog_detail=f"lease lost; {'left_wheel stalls: is it blocked?; ' * 9}")
+    assert sentence(Story().run(clues, 0.01, answer)) == f"the watchdog (lease lost) refused: {why}"
 
 
 @pytest.mark.parametrize(
