@@ -6,14 +6,17 @@ its executor spins, it publishes the client lease (action.require_client_lease i
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from threading import Lock
+from typing import Any, ClassVar, Generic, TypeVar
 from uuid import uuid4
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -38,6 +41,10 @@ SLICE_S = 0.1
 """Longest time without a look at the deadline, at `interrupted`, and at whether the server is still there."""
 SERVER_LOST_S = 2.0
 """A server that cannot be seen for this long is lost."""
+SPUN_S = 1.0
+"""An executor that another thread spun within this time is left to that thread."""
+PASSIVE_S = 0.01
+"""Between two looks at what another thread handles."""
 KEEPALIVE_S = 0.1
 """Period of the client lease [s]; the shortest lease is three times as long."""
 SERVICE_QOS = QoSProfile(depth=100)
@@ -61,8 +68,12 @@ def never() -> bool:
 class GoalClient(Generic[ResultT, FeedbackT]):
     """Sends goals from `node`, which `executor` spins, else the one that the node is in, else one for this client.
 
-    Nothing else may spin the node while a method here waits.
+    Where another thread spins it, also for another client, the methods here only wait: two at once break rclpy's.
     """
+
+    _claims: ClassVar[Lock] = Lock()
+    _spun_by_clients: ClassVar[set[int]] = set()
+    """Ids of the executors."""
 
     def __init__(
         self,
@@ -78,14 +89,17 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         FeedbackWatch(feedback_timeout_s)  # ValueError now, and not when a goal is sent
         name = action_name(action, node.resolve_topic_name, node.resolve_service_name)
         self._reasons = Reasons()
+        self._spun_elsewhere_s = -math.inf
+        group = MutuallyExclusiveCallbackGroup()  # a callback of the application may send a goal and wait
         # Before the client, so that a server that can receive a goal has found this subscription as well.
         self._rejections = node.create_subscription(
-            DiagnosticStatus, f"{name}/rejection", self._on_rejection, REJECTION_QOS
+            DiagnosticStatus, f"{name}/rejection", self._on_rejection, REJECTION_QOS, callback_group=group
         )
         self._client = ActionClient(
             node,
             kind,
             name,
+            callback_group=group,
             goal_service_qos_profile=SERVICE_QOS,
             result_service_qos_profile=SERVICE_QOS,
             cancel_service_qos_profile=SERVICE_QOS,
@@ -101,7 +115,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self.action = action
         self._alive: list[Any] = []
         self._keepalive = node.create_publisher(UUID, f"{name}/keepalive", 10)
-        self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive)
+        self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive, callback_group=group)
         self._node = node
 
     def _end(self) -> None:
@@ -120,8 +134,34 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             left_s = SLICE_S if deadline is None else deadline - time.monotonic()
             if left_s <= 0.0:
                 return False
-            self._executor.spin_once(timeout_sec=min(SLICE_S, left_s))
+            self._spin_once(min(SLICE_S, left_s))
         return True
+
+    def _spin_once(self, timeout_s: float) -> None:
+        if not self._claim():
+            time.sleep(min(PASSIVE_S, timeout_s))
+            return
+        try:
+            self._executor.spin_once(timeout_sec=timeout_s)
+        except RuntimeError as error:
+            if "already-spinning" not in str(error):
+                raise
+            self._spun_elsewhere_s = time.monotonic()
+        finally:
+            self._spun_by_clients.discard(id(self._executor))
+
+    def _claim(self) -> bool:
+        """Whether this thread may spin. `_cb_iter` is of rclpy's executors in Python; EventsExecutor refuses itself."""
+        with self._claims:
+            now_s, callbacks = time.monotonic(), getattr(self._executor, "_cb_iter", None)
+            if id(self._executor) in self._spun_by_clients:
+                return False
+            if callbacks is not None and callbacks.gi_running:
+                self._spun_elsewhere_s = now_s
+            if now_s - self._spun_elsewhere_s < SPUN_S:
+                return False
+            self._spun_by_clients.add(id(self._executor))
+            return True
 
     def wait_for_server(self, timeout_s: float = 5.0, interrupted: Callable[[], bool] = never) -> None:
         """Until a server is found. NoServerError after timeout_s [s], InterruptedDriveError before."""

@@ -43,7 +43,7 @@ Turn = SentGoal[RotateResult]
 
 
 class RotateClient(GoalClient[RotateResult, RotateFeedback]):
-    """Sends goals from `node`, as GoalClient does: nothing else may spin it while a method here waits."""
+    """Sends goals from `node`, as GoalClient does."""
 
     def __init__(
         self,

@@ -13,8 +13,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -124,20 +127,69 @@ EXECUTORS: dict[str, Callable[..., Any]] = {
 }
 
 
+@contextmanager
+def spinning(executor: Any) -> Iterator[None]:
+    """In another thread."""
+    ended = Event()
+
+    def spin() -> None:
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.1)
+
+    with ThreadPoolExecutor(1) as thread:
+        spun = thread.submit(spin)
+        try:
+            yield
+        finally:
+            ended.set()
+        spun.result()  # no error of two threads in one executor
+
+
+@pytest.mark.parametrize("thread", ["this", "another"])
 @pytest.mark.parametrize("executor", EXECUTORS)
-def test_two_clients_on_one_node_drive_with_each_executor(paused: Paused, executor: str) -> None:
+def test_two_clients_on_one_node_drive_with_each_executor(paused: Paused, executor: str, thread: str) -> None:
     context = paused.robot.node.node.context
     node, spins = Node("application", context=context), EXECUTORS[executor](context=context)
     spins.add_node(node)
     drive, rotate = DriveClient(node), RotateClient(node)
-    for client, way, speed in ((drive, 0.1, 0.3), (rotate, 0.2, 1.0)):
-        result = client.send(way, speed, discovery_timeout_s=RESULT_S).wait(RESULT_S)
-        assert result is not None
-        assert result.status is Status.SUCCEEDED
+    with spinning(spins) if thread == "another" else nullcontext():
+        for client, way, speed in ((drive, 0.1, 0.3), (rotate, 0.2, 1.0)):
+            result = client.send(way, speed, discovery_timeout_s=RESULT_S).wait(RESULT_S)
+            assert result is not None
+            assert result.status is Status.SUCCEEDED
     drive.close()
     rotate.close()
     spins.shutdown()
     node.destroy_node()
+
+
+def test_two_threads_use_the_clients_of_one_node(paused: Paused) -> None:
+    """One goal gets the base, the other is rejected: none is sent and left alone by an error of the executor."""
+    node = Node("application", context=paused.robot.node.node.context)
+    clients: tuple[Any, ...] = (DriveClient(node), RotateClient(node))
+
+    def send(client: Any) -> str:
+        try:
+            return str(client.send(0.1, 0.3, discovery_timeout_s=RESULT_S).wait(RESULT_S).status.name)
+        except RejectedError:
+            return "REJECTED"
+
+    with ThreadPoolExecutor(2) as threads:
+        assert sorted(threads.map(send, clients)) == ["REJECTED", "SUCCEEDED"]
+    for client in clients:
+        client.close()
+    node.destroy_node()
+
+
+def test_the_square_of_the_page_ends_where_it_began(paused: Paused, tmp_path: Path, spawn: Spawn) -> None:
+    robot, file = paused.robot, tmp_path / "square.py"
+    file.write_text(program(file.name), encoding="utf-8")
+    start = robot.truth()
+    square = spawn([sys.executable, str(file)], robot.env)
+    assert square.wait(60.0) == 0, square.log()
+    end = robot.truth()
+    assert math.dist((start.x_m, start.y_m), (end.x_m, end.y_m)) < 0.02
+    assert end.path_m - start.path_m == pytest.approx(2.0, abs=0.02)
 
 
 def test_an_application_of_asyncio_waits_in_a_thread_and_its_loop_runs_on(paused: Paused) -> None:
