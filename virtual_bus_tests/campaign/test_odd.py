@@ -36,7 +36,8 @@ NEEDS_A_CURE = {
     "short_range",
     "reversed_velocity",
 }
-UNUSABLE = {"synchronous_alone", "wide_status"}
+UNUSABLE = {"synchronous_alone", "wide_status", "narrow_counter"}
+STOPPED = {"answers_again", "taken_local", "passing_fault"}
 TOGETHER = range(8)
 
 
@@ -46,6 +47,8 @@ def test_each_oddity_alone_drives_or_is_cured_by_what_the_message_names(name: st
     assert trial.wrong == [], told(trial)
     if name in UNUSABLE:
         assert trial.ended == "cannot be used", told(trial)
+    elif name in STOPPED:
+        assert trial.ended == "stopped, and told", told(trial)
     elif name in NEEDS_A_CURE:
         assert trial.ended == "drove after cures", told(trial)
     elif name != "slow_heartbeat":

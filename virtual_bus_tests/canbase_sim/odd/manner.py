@@ -74,3 +74,25 @@ class Manner:
     """6064h wraps within 0 to this (607Bh)."""
     velocity_sign: int = 1
     """Of 606Ch, against 60FFh and 6064h."""
+    velocity_held_s: float = 0.0
+    """606Ch has a new value so often [s]; 0: always."""
+    velocity_spike: int = 0
+    """606Ch is so many bits beside the speed in a sample of SPIKE_SHARE."""
+    answers_again: float = 0.0
+    """Share of its SDO answers that are on the bus a second time, some milliseconds later."""
+    heartbeat_jitter_s: float = 0.0
+    """Each heartbeat comes up to so much after its time [s]."""
+    heartbeat_bits: int = 0
+    """Bits that are set beside the NMT state."""
+    nmt_late_s: float = 0.0
+    """It obeys an NMT command so late [s]."""
+    enable_late_s: float = 0.0
+    """From "enable operation" to operation enabled [s]: a brake, a search for the commutation angle."""
+    motionless_s: float = 0.0
+    """After operation enabled it follows no setpoint for so long [s]."""
+    remote_late_s: float = 0.0
+    """Bit 9 of the statusword is set so long after power on [s]; before it ignores the controlword."""
+    local_after_s: float = 0.0
+    """So long after its first motion somebody takes it into local mode [s]: bit 9 is 0, and it stops by itself."""
+    fails_after_s: float = 0.0
+    """So long after its first motion it has a fault, over-voltage, that clears itself FAULT_S later [s]."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import struct
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from random import Random
 
 from canbase_sim.axis_parts import AxisParts
 from canbase_sim.cia301 import nmt, sdo_server
 from canbase_sim.cia301.dictionary import AXIS_STRIDE, key
+from canbase_sim.cia402.axis import Axis
+from canbase_sim.cia402.states import State
 from canbase_sim.frame import Frame
 from canbase_sim.line import Line
 from canbase_sim.node import SimulatedNode
@@ -21,7 +24,11 @@ from canbase_sim.plant.battery import REST_V
 MAKERS_CODE, NO_ERROR = 0xFF01, 0x0000
 """Emergency codes: FFxxh is the manufacturer's (CiA 301)."""
 EMCY_S = 0.05
-"""From one to the "no error" after it [s]."""
+"""From one to the "no error" after it, at most [s]."""
+OVERVOLTAGE, FAULT_S = 0x3210, 0.3
+SPIKE_SHARE = 0.005
+REMOTE = 0x0200
+"""Bit of the statusword."""
 
 
 def _unloaded() -> float:
@@ -47,6 +54,10 @@ class OddNode(SimulatedNode):
         self._emcy_at, self._is_error = now_s, False
         self._is_up = False
         self._modes: dict[int, tuple[int, float]] = {}
+        self._commands: deque[tuple[float, bytes]] = deque()
+        self._moved_at = self._fault_at = math.inf
+        self._on_at, self._held = now_s, [(-math.inf, 0)] * len(axes)
+        self._switched_on_at, self._enabled_at = [math.inf] * len(axes), [math.inf] * len(axes)
         super().__init__(node_id, axes, now_s, boot_delay_s, fixed, manner.personality, sdo_delay_s, supply_v)
         self._is_up = True
         for tpdo in self._tpdos:
@@ -59,11 +70,56 @@ class OddNode(SimulatedNode):
         """As every drive, and its emergency messages."""
         if self.manner.emcy_every_s and now_s >= self._emcy_at and self.state in nmt.HAS_SDO:
             self._is_error = not self._is_error
-            self._emcy_at = now_s + (EMCY_S if self._is_error else self.manner.emcy_every_s)
+            every_s = self.manner.emcy_every_s
+            self._emcy_at = now_s + (min(EMCY_S, every_s) if self._is_error else every_s)
             code = MAKERS_CODE if self._is_error else NO_ERROR
             self._send_emcy(Frame(0x080 + self.node_id, struct.pack("<HB5x", code, 0x80 * self._is_error)))
         self._follow_modes(now_s)
+        while self._commands and now_s >= self._commands[0][0]:
+            super()._on_nmt(self._commands.popleft()[1], now_s)
+        for number, axis in enumerate(self.axes):
+            self._take_power(number, axis, now_s)
+            self._lose_it(axis, now_s)
         return super().tick(now_s)
+
+    def _on_nmt(self, data: bytes, now_s: float) -> None:
+        """Some time later."""
+        self._commands.append((now_s + self.manner.nmt_late_s, data))
+
+    def _take_power(self, number: int, axis: Axis, now_s: float) -> None:
+        """Slowly, and not before it is remote."""
+        manner = self.manner
+        waits_for_power, waits_for_motion = axis.state is State.SWITCHED_ON, axis.state is State.OPERATION_ENABLED
+        self._switched_on_at[number] = min(self._switched_on_at[number], now_s) if waits_for_power else math.inf
+        self._enabled_at[number] = min(self._enabled_at[number], now_s) if waits_for_motion else math.inf
+        if manner.enable_late_s and axis.faults.cannot_enable is not now_s < (
+            self._switched_on_at[number] + manner.enable_late_s
+        ):
+            axis.faults.cannot_enable = not axis.faults.cannot_enable
+            axis._obey()
+        is_motionless = now_s < self._enabled_at[number] + manner.motionless_s
+        if manner.motionless_s and axis.faults.ignores_setpoints is not is_motionless:
+            axis.faults.ignores_setpoints = is_motionless
+            axis._steer()
+        if waits_for_motion and axis._target_mps():
+            self._moved_at = min(self._moved_at, now_s)
+
+    def _lose_it(self, axis: Axis, now_s: float) -> None:
+        """Local mode, or a fault that does not stay."""
+        manner = self.manner
+        if manner.local_after_s and not axis.faults.ignores_setpoints and self._is_local(now_s):
+            axis._stop(axis._value(0x5D), lambda: None)
+            axis.faults.ignores_setpoints = True
+        if manner.fails_after_s and self._fault_at == math.inf and now_s >= self._moved_at + manner.fails_after_s:
+            self._fault_at = now_s
+            axis.fail(OVERVOLTAGE)
+        if axis.state is State.FAULT and now_s >= self._fault_at + FAULT_S:
+            axis._reset_fault()
+
+    def _is_local(self, now_s: float) -> bool:
+        manner = self.manner
+        late = now_s < self._on_at + manner.remote_late_s
+        return late or bool(manner.local_after_s and now_s >= self._moved_at + manner.local_after_s)
 
     def _follow_modes(self, now_s: float) -> None:
         """6061h and the motor, some time after 6060h."""
@@ -95,16 +151,30 @@ class OddNode(SimulatedNode):
         values, manner = self.dictionary.values, self.manner
         for number, axis in enumerate(self.axes):
             base = AXIS_STRIDE * number
-            if manner.velocity_noise:
-                noise = self._random.randint(-manner.velocity_noise, manner.velocity_noise)
-                velocity = key(0x606C + base)
-                values[velocity] = axis.scale.limited(values[velocity] + noise)
+            values[key(0x606C + base)] = self._shown_velocity(number, axis, values[key(0x606C + base)])
             counts = key(0x6064 + base)
             if manner.position_range:
                 values[counts] %= manner.position_range + 1
             elif manner.counts_per_m:
                 scaled = values[counts] * manner.counts_per_m / axis.scale.counts_per_m
                 values[counts] = (round(scaled) + 2**31) % 2**32 - 2**31
-            values[key(0x606C + base)] *= manner.velocity_sign
             if manner.status_bits:
                 values[key(0x6041 + base)] |= self._random.getrandbits(16) & manner.status_bits
+            if self._is_local(self._now):
+                values[key(0x6041 + base)] &= ~REMOTE
+
+    def _shown_velocity(self, number: int, axis: Axis, velocity: int) -> int:
+        """606Ch."""
+        manner = self.manner
+        if manner.velocity_noise:
+            velocity = axis.scale.limited(
+                velocity + self._random.randint(-manner.velocity_noise, manner.velocity_noise)
+            )
+        velocity *= manner.velocity_sign
+        if manner.velocity_spike and self._random.random() < SPIKE_SHARE:
+            velocity = axis.scale.limited(velocity + manner.velocity_spike)
+        at_s, held = self._held[number]
+        if self._now >= at_s + manner.velocity_held_s:
+            self._held[number] = self._now, velocity
+            return velocity
+        return held

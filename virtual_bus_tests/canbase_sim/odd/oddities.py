@@ -373,6 +373,76 @@ def _reversed_velocity(_random: Random) -> Drawn:
     return Drawn("606Ch has the other sign", with_manner(velocity_sign=-1), tool=frozenset((0x607E,)))
 
 
+def _narrow_counter(_random: Random) -> Drawn:
+    return Drawn(
+        "6064h counts in 16 bits, and 607Bh does not say so", with_manner(position_range=65_535), unusable=True
+    )
+
+
+def _held_velocity(random: Random) -> Drawn:
+    held_s = round(random.uniform(0.02, 0.1), 3)
+    return Drawn(f"606Ch is measured each {held_s} s", with_manner(velocity_held_s=held_s), stops=frozenset(("606Ch",)))
+
+
+def _velocity_spikes(random: Random) -> Drawn:
+    mps = round(random.uniform(-0.5, 0.5), 2)
+    change = with_manner(velocity_spike=round(19098.6 * mps))
+    return Drawn(f"606Ch is {mps} m/s beside the speed now and then", change, stops=frozenset(("changes of speed",)))
+
+
+def _answers_again(random: Random) -> Drawn:
+    share = round(random.uniform(0.05, 0.5), 2)
+    stops = frozenset(("answered twice",))
+    return Drawn(f"{share:.0%} of its SDO answers come again later", with_manner(answers_again=share), stops=stops)
+
+
+def _jittery_heartbeat(random: Random) -> Drawn:
+    late_s = round(random.uniform(0.03, 0.09), 3)
+    return Drawn(f"heartbeats up to {late_s} s late", with_manner(heartbeat_jitter_s=late_s))
+
+
+def _heartbeat_bit(_random: Random) -> Drawn:
+    return Drawn("bit 7 of its heartbeats is set", with_manner(heartbeat_bits=0x80))
+
+
+def _emergency_flood(random: Random) -> Drawn:
+    rate = random.randint(50, 150)
+    return Drawn(f"{rate} emergency messages a second", with_manner(emcy_every_s=1.0 / rate))
+
+
+def _late_nmt(random: Random) -> Drawn:
+    late_s = round(10 ** random.uniform(-2.0, -0.3), 3)
+    return Drawn(f"obeys NMT commands {late_s} s later", with_manner(nmt_late_s=late_s))
+
+
+def _late_enable(random: Random) -> Drawn:
+    late_s = round(random.uniform(0.5, 3.0), 2)
+    return Drawn(f"needs {late_s} s for operation enabled", with_manner(enable_late_s=late_s))
+
+
+def _motionless(random: Random) -> Drawn:
+    still_s = round(random.uniform(0.2, 1.5), 2)
+    change = with_manner(motionless_s=still_s)
+    return Drawn(f"does not turn for {still_s} s after it was enabled", change, stops=frozenset(("brake",)))
+
+
+def _late_remote(random: Random) -> Drawn:
+    late_s = round(random.uniform(1.0, 5.0), 1)
+    return Drawn(f"bit 9 is set {late_s} s after power on", with_manner(remote_late_s=late_s))
+
+
+def _taken_local(random: Random) -> Drawn:
+    after_s = round(random.uniform(0.3, 1.5), 2)
+    change = with_manner(local_after_s=after_s)
+    return Drawn(f"is in local mode {after_s} s after it began to move", change, stops=frozenset(("bit 9",)))
+
+
+def _passing_fault(random: Random) -> Drawn:
+    after_s = round(random.uniform(0.3, 1.5), 2)
+    change = with_manner(fails_after_s=after_s)
+    return Drawn(f"over-voltage for 0.3 s, {after_s} s after it began to move", change, stops=frozenset(("3210h",)))
+
+
 ALIKE = (
     frozenset(("few_pdos", "fixed_cob_ids", "one_tpdo")),
     frozenset(("narrow_velocity", "one_tpdo")),
@@ -385,8 +455,20 @@ ALIKE = (
     frozenset(("other_unit", "soft_stop", "rounded_ramps", "refused", "missing")),  # ramps in the unit of 60FFh
     frozenset(("counted_syncs", "refused", "missing", "no_synchronous_pdos")),
     frozenset(("late_mode", "mode_without_power", "cyclic_alone", "refused", "missing")),
-    frozenset(("other_counts", "short_range", "reversed_velocity", "noisy_velocity", "count_wraps", "other_unit")),
-    frozenset(("late_heartbeat", "guarding_alone")),
+    frozenset(
+        (
+            "other_counts",
+            "short_range",
+            "reversed_velocity",
+            "noisy_velocity",
+            "count_wraps",
+            "narrow_counter",
+            "other_unit",
+        )
+    ),
+    frozenset(("late_heartbeat", "jittery_heartbeat", "heartbeat_bit", "guarding_alone")),
+    frozenset(("emergencies", "emergency_flood")),
+    frozenset(("taken_local", "passing_fault", "motionless", "late_mode")),
     frozenset(("long_tpdo", "fixed_mapping", "one_tpdo", "narrow_velocity", "wide_status")),
     frozenset(("other_unit", "noisy_velocity", "narrow_target", "narrow_velocity", "one_tpdo", "stored_values")),
 )
@@ -446,5 +528,18 @@ ODDITIES: Mapping[str, Oddity] = {
     "short_range": Oddity("CiA 402-2, 607Bh", "the position has a short range", _short_range),
     "reversed_velocity": Oddity("seen: swapped tracks", "606Ch has the other sign", _reversed_velocity),
     "count_wraps": Oddity("CiA 402-2, 6064h: INTEGER32", "the counter of the encoder wraps", _count_wraps),
+    "narrow_counter": Oddity("seen: 16-bit encoders", "6064h wraps at 16 bits", _narrow_counter),
+    "held_velocity": Oddity("CiA 402-2, 606Ch: no rate", "the measured speed is seldom new", _held_velocity),
+    "velocity_spikes": Oddity("CiA 402-2, 606Ch: no accuracy", "the measured speed has spikes", _velocity_spikes),
+    "answers_again": Oddity("seen: gateways", "SDO answers come again, after the next request", _answers_again),
+    "jittery_heartbeat": Oddity("CiA 301, 1017h: no jitter", "heartbeats come late", _jittery_heartbeat),
+    "heartbeat_bit": Oddity("seen: bit 7 of node guarding", "a reserved bit of its heartbeat is set", _heartbeat_bit),
+    "emergency_flood": Oddity("CiA 301, 1015h: 0", "many emergency messages", _emergency_flood),
+    "late_nmt": Oddity("CiA 301, NMT: no time limit", "NMT commands are obeyed late", _late_nmt),
+    "late_enable": Oddity("CiA 402-2, transition 4: no time limit", "it is enabled slowly", _late_enable),
+    "motionless": Oddity("CiA 402-2, 60FFh", "it turns late after it was enabled", _motionless),
+    "late_remote": Oddity("CiA 402-2, 6041h bit 9", "it is in local mode at first", _late_remote),
+    "taken_local": Oddity("CiA 402-2, 6041h bit 9", "somebody takes it into local mode", _taken_local),
+    "passing_fault": Oddity("CiA 402-2, transition 15", "a fault that clears itself", _passing_fault),
 }
 """By name."""

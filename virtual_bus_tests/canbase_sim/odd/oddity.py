@@ -25,6 +25,8 @@ class Drawn:
     """Indexes that the manufacturer's tool sets as they should be: then the oddity is gone."""
     unusable: bool = False
     """A drive without something that canbase needs (docs/drives.md)."""
+    stops: frozenset[str] = frozenset()
+    """Nothing in robot.yaml cures it: it drives, or it is stopped and the message has one of these words."""
     name: str = ""
 
 
