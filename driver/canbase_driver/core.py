@@ -312,11 +312,10 @@ class DriverCore:
 
     def _found_clue(self, liar: int) -> str:
         """What the driver knows about a trip. `liar`: the node whose sensors the watchdog found faulty; 0: none."""
-        clue = self._drives.contradiction(liar) or self._drives.unshown_mode(liar)
-        if clue or self.state is not DriverState.ENABLED:
-            return clue  # by now the statuswords speak of the stop
-        node_id = self._watchdog.not_moving_as_ordered
-        return "" if node_id is None else self._drives.not_following(node_id)
+        clue, node_id = self._drives.contradiction(liar), self._watchdog.not_moving_as_ordered
+        if not clue and node_id is not None and self.state is DriverState.ENABLED:  # later they speak of the stop
+            clue = self._drives.not_following(node_id)
+        return clue or self._drives.unshown_mode(liar)
 
     def _heartbeat(self, now_s: float) -> list[Frame]:
         if now_s - self._heartbeat_at < self._heartbeat_s or self._readiness.released:

@@ -425,7 +425,8 @@ class CanopenNode:
         if self.presence is Presence.STARTING:
             self._check_started(now_s)
         if self._written and self.has_pdos and self.is_off(now_s):
-            self.lose(f"is configured anew: another client has written its {self._written}", now_s)
+            who = "another client, or a gateway that repeats answers,"
+            self.lose(f"is configured anew: {who} has written its {self._written}", now_s)
         if self._boot is None:
             return self._measures.tick(now_s) if self.presence is Presence.READY else []
         frames = self._boot.tick(now_s)

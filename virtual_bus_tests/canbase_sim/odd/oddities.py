@@ -392,7 +392,7 @@ def _velocity_spikes(random: Random) -> Drawn:
 
 def _answers_again(random: Random) -> Drawn:
     share = round(random.uniform(0.05, 0.5), 2)
-    stops = frozenset(("answered twice",))
+    stops = frozenset(("answered twice", "gateway that repeats"))
     return Drawn(f"{share:.0%} of its SDO answers come again later", with_manner(answers_again=share), stops=stops)
 
 

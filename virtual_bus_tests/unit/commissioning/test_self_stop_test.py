@@ -114,7 +114,9 @@ def test_another_client_that_writes_1016h_meanwhile_ends_it() -> None:
         world.bench.on_frame(BenchFrame(0x602, bytes.fromhex("23 16 10 01 00 00 00 00")), world.now_s)
         return (yield from prove(rig, SPEED_MPS))
 
-    with pytest.raises(RigError, match="is configured anew: another client has written its 1016h:1"):
+    with pytest.raises(
+        RigError, match="is configured anew: another client, or a gateway that repeats answers, has written its 1016h:1"
+    ):
         world.guide(sabotaged)
     assert_off(world)
 
