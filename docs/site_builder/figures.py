@@ -19,6 +19,7 @@ def figures(root: Path) -> dict[str, str]:
     measured = _benchmarks(root)
     goals = _row((root / "docs" / "odometry.md").read_text(encoding="utf-8").partition(_GOALS)[2], "canbase")
     teeth = json.loads((root / "virtual_bus_tests" / "campaign" / "teeth.json").read_text(encoding="utf-8"))
+    scores = json.loads((root / "virtual_bus_tests" / "campaign" / "scores.json").read_text(encoding="utf-8"))
     whole_chain = _number(measured["whole chain: processor while a goal drives"])
     reaction = re.search(r"p99 ([\d.]+)", measured[next(what for what in measured if what.startswith("mux, filter, "))])
     return {
@@ -27,6 +28,7 @@ def figures(root: Path) -> dict[str, str]:
         "reaction p99": f"{_number(reaction[1] if reaction else ''):.0f} ms",
         "goal error": f"{goals['error max']} mm",
         "goal too fast": f"{goals['too fast, max [mm/s]']} mm/s",
+        **{f"{name} score": score for name, score in scores.items()},
         "teeth": f"{sum(not row['property'] for row in teeth)} of {len(teeth)}",
     }
 

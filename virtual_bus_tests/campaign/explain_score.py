@@ -27,6 +27,7 @@ from typing import Final
 import can
 
 from campaign.nightly import first_seed
+from campaign.scores import keep
 from canbase_campaign.forked import in_a_copy
 from canbase_campaign.scenario import Start
 from canbase_campaign.twins import GOAL, TWINS, Twin
@@ -481,6 +482,7 @@ def main() -> int:
         "--first", type=int, default=first_seed(datetime.now(timezone.utc).date()), help="seed of the first one"
     )
     parser.add_argument("--seed", type=int, help="tell this scenario alone")
+    parser.add_argument("--keep", action="store_true", help="the score goes to scores.json, and so to docs/explain.md")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.scenarios) if given.seed is None else (given.seed,)
     scores: Counter[str] = Counter()
@@ -489,7 +491,10 @@ def main() -> int:
         if answer.wrong or given.seed is not None:
             print(told(answer), flush=True)
     total = scores.total()
-    print(", ".join(f"{scores[name]} {name}" for name in (RIGHT, CANNOT_TELL, WRONG)), f"of {total} recordings")
+    score = f"{', '.join(f'{scores[name]} {name}' for name in (RIGHT, CANNOT_TELL, WRONG))} of {total} recordings"
+    print(score)
+    if given.keep:
+        keep("explain", score)
     return 1 if scores[WRONG] > MOST_WRONG * total else 0
 
 

@@ -107,7 +107,7 @@ class OddNode(SimulatedNode):
     def _lose_it(self, axis: Axis, now_s: float) -> None:
         """Local mode, or a fault that does not stay."""
         manner = self.manner
-        if manner.local_after_s and not axis.faults.ignores_setpoints and self._is_local(now_s):
+        if self._is_taken(now_s) and not axis.faults.ignores_setpoints:
             axis._stop(axis._value(0x5D), lambda: None)
             axis.faults.ignores_setpoints = True
         if manner.fails_after_s and self._fault_at == math.inf and now_s >= self._moved_at + manner.fails_after_s:
@@ -116,10 +116,9 @@ class OddNode(SimulatedNode):
         if axis.state is State.FAULT and now_s >= self._fault_at + FAULT_S:
             axis._reset_fault()
 
-    def _is_local(self, now_s: float) -> bool:
-        manner = self.manner
-        late = now_s < self._on_at + manner.remote_late_s
-        return late or bool(manner.local_after_s and now_s >= self._moved_at + manner.local_after_s)
+    def _is_taken(self, now_s: float) -> bool:
+        """Into local mode."""
+        return self.manner.local_after_s > 0.0 and now_s >= self._moved_at + self.manner.local_after_s
 
     def _follow_modes(self, now_s: float) -> None:
         """6061h and the motor, some time after 6060h."""
@@ -160,7 +159,7 @@ class OddNode(SimulatedNode):
                 values[counts] = (round(scaled) + 2**31) % 2**32 - 2**31
             if manner.status_bits:
                 values[key(0x6041 + base)] |= self._random.getrandbits(16) & manner.status_bits
-            if self._is_local(self._now):
+            if self._now < self._on_at + manner.remote_late_s or self._is_taken(self._now):
                 values[key(0x6041 + base)] &= ~REMOTE
 
     def _shown_velocity(self, number: int, axis: Axis, velocity: int) -> int:
