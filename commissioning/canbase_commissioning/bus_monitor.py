@@ -180,6 +180,10 @@ class Listener:
             signs.append(f"SDO requests to {_nodes(self._sdo_requests)}")
         return signs
 
+    def sync_hz(self, now_s: float) -> float:
+        """SYNCs a second, of whomever."""
+        return self._syncs / max(now_s - self.since, 1e-3)
+
     def load(self, bitrate: int, now_s: float) -> float:
         """Share of the bus's time that the frames took, at most; 0 to 1 and a little more where `bitrate` is wrong."""
         return self.bits / bitrate / max(now_s - self.since, 1e-3)

@@ -18,13 +18,31 @@ from canbase_driver.cia301.emcy import emcy_text
 from canbase_driver.cia301.nmt import NmtState
 from canbase_driver.cia402 import DriveState
 from canbase_driver.supervision.bus_health import ControllerState
-from canbase_driver.supervision.watchdog_link import LEASE_AGE_UNKNOWN, RUNGS, TRIPPED, WATCHING, WatchdogCounters
+from canbase_driver.supervision.watchdog_link import (
+    CAUSES,
+    LEASE_AGE_UNKNOWN,
+    RUNGS,
+    TRIPPED,
+    WATCHING,
+    WatchdogCounters,
+)
 
 SHORT_QUEUE, GOOD_QUEUE, LONG_QUEUE = 32, 64, 100
 """Frames. Into the kernel's 10 a cycle of several axes does not fit; what waits in a long one without acknowledgement
 goes out late."""
 RUNS: Final = f"If it runs, it hangs: {RESTART}"
 _SHOWN: Final = 4
+TWICE: Final = 1.5
+"""SYNCs for each that the driver sends: more are not its own, nor frames that were sent again."""
+DRIVER_SILENT: Final = CAUSES[2]
+BACK: Final = "motor_driver lives now: it hung or ended (its log), or frames get lost (cable, termination). Then"
+CURES: Final = {
+    CAUSES[1]: "does safety_filter run, with this lease.socket? It sent no leases. Then",
+    DRIVER_SILENT: f"does motor_driver run? {RUNS}. Then",
+    CAUSES[8]: "another program commands this bus, or frames come twice: end it, then",
+    CAUSES[10]: "is this computer overloaded? Does the watchdog have real-time priority? Then",
+}
+"""By the cause of a trip that is about no drive; then a reset."""
 _CUT_OFF: Final = (ControllerState.BUS_OFF, ControllerState.ERROR_PASSIVE, ControllerState.STOPPED)
 """Little or nothing gets through."""
 
@@ -123,6 +141,11 @@ def _masters(seen: BusEvidence) -> Check:
         return fail("masters", "; ".join(signs), "another program commands this bus: end it before canbase drives")
     if not seen.canbase_runs:
         return ok("masters", "none; canbase's driver does not run, so the drives were looked at alone")
+    own_hz = seen.robot.rates.control_hz if seen.heard.driver_lives else 0.0
+    sync_hz = seen.heard.sync_hz(seen.now_s)
+    if sync_hz > TWICE * own_hz:
+        found = f"SYNC, {sync_hz:.0f} a second, of which canbase's driver sends {own_hz:.0f}"
+        return fail("masters", found, "another program commands this bus too: end it")
     ours = [text for node_id, text in OURS.items() if node_id in seen.heard.nodes]
     return ok("masters", " and ".join(ours))
 
@@ -157,7 +180,9 @@ def _watchdog_state(seen: BusEvidence, found: str, age_s: float) -> Check:
     if state.state == TRIPPED:
         about = f" of node {state.node_id}" if state.node_id else ""
         rung = RUNGS[state.rung] if state.rung < len(RUNGS) else str(state.rung)
-        return fail(name, f"{found}; cause: {state.cause_text}{about}, rung: {rung}", "remove the cause, canbase reset")
+        back = seen.heard.driver_lives and state.cause_text == DRIVER_SILENT
+        cure = BACK if back else CURES.get(state.cause_text, "remove the cause,")
+        return fail(name, f"{found}; cause: {state.cause_text}{about}, rung: {rung}", f"{cure} canbase reset")
     return ok(name, found) if state.state == WATCHING else warn(name, found, "look again in a second")
 
 
@@ -188,9 +213,7 @@ def _node(seen: BusEvidence, node_id: int, drives: tuple[Drive, ...]) -> list[Ch
 def _unread(seen: BusEvidence, name: str, node_id: int) -> Check:
     why = seen.unread.get(node_id, "it was not queried")
     if node_id in seen.heard.nodes:
-        return warn(
-            name, f"it sends frames, {_ages(seen, node_id)}; {why}", "run doctor again when its SDO channel is free"
-        )
+        return warn(name, f"it sends frames, {_ages(seen, node_id)}; {why}", AGAIN if why == IN_USE else NO_ANSWER)
     cure = "power, cable, termination, bit rate, node id; canbase bus scan shows who answers"
     if seen.robot.bus.is_virtual:
         cure = "do the simulated drives run (canbase up, or canbase serve sim), on this bus?"
@@ -229,8 +252,15 @@ def _life(seen: BusEvidence, name: str, found: Inspection) -> Check:
         told = f"{told}; it is not in NMT operational beside a driver"
         if seen.heard.watchdog is not None and seen.heard.watchdog.state == TRIPPED:
             return warn(f"{name}: state", told, "the watchdog stopped it: canbase reset boots it again")
+        if _is_configured(found):
+            return warn(f"{name}: state", told, WAITS)
         return fail(f"{name}: state", told, NOT_BOOTED)
     return ok(f"{name}: state", told)
+
+
+def _is_configured(found: Inspection) -> bool:
+    parts = (found.settings, found.pdos, found.self_stop_part)
+    return not (found.wrong_identity or any(part.changes or part.problem for part in parts))
 
 
 def _ages(seen: BusEvidence, node_id: int) -> str:
@@ -245,7 +275,18 @@ def _ages(seen: BusEvidence, node_id: int) -> str:
 
 
 NOT_BOOTED: Final = (
-    "the driver could not boot this drive: the reason is in its log and in boot_problem of motor_driver/status"
+    "the driver could not boot this drive, or still boots it: the reason is in its log and in boot_problem of "
+    "motor_driver/status"
+)
+WAITS: Final = (
+    "it is configured as the driver does it: the driver starts it when all drives are ready; if it alone is left, the "
+    "reason is in boot_problem of motor_driver/status"
+)
+IN_USE: Final = "its SDO channel is in use all the time: the driver boots it"
+AGAIN: Final = "run doctor again when its SDO channel is free"
+NO_ANSWER: Final = (
+    "frames get lost (cable, termination, 60 Ω between CAN_H and CAN_L), or the drive answers late: "
+    "`sdo.timeout_s` of its drive profile"
 )
 
 

@@ -12,7 +12,7 @@ from canbase_commissioning.onbus.bus_session import BusSession
 from canbase_commissioning.onbus.cable import read_link
 from canbase_commissioning.sdo_session import SdoSession
 from canbase_config.robot import Robot
-from canbase_doctor.bus_checks import BusEvidence
+from canbase_doctor.bus_checks import IN_USE, BusEvidence
 from canbase_doctor.inspection import Inspection, inspect
 from canbase_driver.boot.node_boot import sdo_client
 
@@ -55,7 +55,7 @@ def evidence(
 ) -> BusEvidence:
     """What came of it."""
     unread = {
-        node_id: "its SDO channel is in use all the time: the driver boots it" if task.blocked else str(task.error)
+        node_id: IN_USE if task.blocked else str(task.error)
         for node_id, task in inquiry.tasks.items()
         if task.result is None
     }

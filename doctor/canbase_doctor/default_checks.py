@@ -15,6 +15,7 @@ from canbase_doctor.check import RESTART, Check, fail, ok, warn
 from canbase_doctor.evidence import Evidence
 from canbase_doctor.metrics_check import metrics
 from canbase_doctor.nav2_checks import nav2_checks
+from canbase_driver.cia402 import DriveState
 from canbase_driver.supervision.watchdog_link import RUNGS
 from canbase_runtime.driver_state import DriverState, driver_state
 from canbase_runtime.source_standing import SourceStanding, source_standing
@@ -32,6 +33,8 @@ HANGS = f"its process hangs, or its timers do not run: {RESTART}"
 PARTS_RUN = "is it running (canbase up), in this namespace and ROS_DOMAIN_ID?"
 MOSTLY_USABLE = 0.5
 """Share of beams: a scanner with more invalid beams is covered, dirty or defective."""
+HEARTBEAT_LOST = 0x8130
+"""Error code (CiA 301, EMCY): the heartbeat that a drive watches."""
 PAUSE_S = 0.05
 """A pause of the watchdog's loop that is worth a look: ten of its turns."""
 
@@ -87,7 +90,7 @@ def watchdog(evidence: Evidence) -> list[Check]:
         return [
             fail(
                 "watchdog",
-                "unknown: reported by motor_driver, which does not answer (not running, or it hangs)",
+                "unknown: nothing came on motor_driver/status, which reports it",
                 PARTS_RUN,
             )
         ]
@@ -129,21 +132,34 @@ def _watchdog_counts(status: DriverStatus) -> dict[str, int]:
 def drives(evidence: Evidence) -> list[Check]:
     """One row per drive that motor_driver reports."""
     status = evidence.on("motor_driver/status").last
-    return [] if status is None else [_drive(drive) for drive in status.drives]
+    if status is None:
+        return []
+    withheld = status.watchdog_rung >= RUNGS.index("heartbeat withheld")
+    return [_drive(drive, withheld) for drive in status.drives]
 
 
-def _drive(drive: Any) -> Check:
+def _drive(drive: Any, withheld: bool) -> Check:
+    """`withheld`: the watchdog does not send its heartbeat, so that the drives stop by themselves."""
     name = f"drive {drive.joint} (node {drive.node_id})"
     ages = f"feedback {_age(drive.feedback_age_s)}, heartbeat {_age(drive.heartbeat_age_s)} old"
     found = f"{drive.state}, {drive.nmt_state}; {ages}"
+    if withheld and drive.error_code == HEARTBEAT_LOST:
+        return warn(name, f"{found}; it stopped by itself, as the watchdog withholds its heartbeat", "canbase reset")
+    error = f"0x{drive.error_code:04X} {drive.error_text}"
+    if drive.error_code and drive.state == DriveState.OPERATION_ENABLED.text:
+        return warn(name, f"{found}; {error}, and it drives on", "see its manual")
     if drive.error_code:
-        return fail(name, f"{found}; 0x{drive.error_code:04X} {drive.error_text}", "remove the cause, canbase reset")
-    if math.isnan(drive.heartbeat_age_s) and math.isnan(drive.feedback_age_s):
+        return fail(name, f"{found}; {error}", "remove the cause, canbase reset")
+    if drive.boot_problem:
+        return fail(name, f"{found}; {drive.boot_problem}", "the driver cannot boot it: do what this says")
+    if not drive.heartbeat_age_s < SILENT_S and math.isnan(drive.feedback_age_s):
         return fail(
             name,
-            "no frame received",
+            f"no frame received; {found}",
             "power, cable, termination, bit rate, node id; canbase bus scan shows who answers",
         )
+    if math.isnan(drive.feedback_age_s):
+        return warn(name, f"{found}; it is not booted yet", "look again in a second")
     if not drive.stops_by_itself:
         return warn(
             name, f"{found}; does not watch the watchdog's heartbeat", "it will not stop when the computer dies"
@@ -213,6 +229,9 @@ def _mux(state: MuxState) -> Check:
         told = f"{ignored[0].name} is not followed: {ignored[0].reason}"
         return fail("velocity_mux", told, UNFOLLOWED[source_standing(ignored[0].standing)])
     found = f"{state.active} drives" if state.active else "no active source"
+    held = [f"lock {lock.name}: {lock.reason}" for lock in state.locks if lock.holds]
+    if held and not state.active:
+        return warn("velocity_mux", f"{found}; {'; '.join(held)}", "release it (docs/velocity.md, Sources and locks)")
     bad = [source.name for source in state.sources if source.refused]
     if bad:
         return warn("velocity_mux", f"{found}; refused NaN or infinity of {', '.join(bad)}", "correct that sender")

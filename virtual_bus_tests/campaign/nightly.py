@@ -89,6 +89,15 @@ def explained(night: Night) -> Iterator[str]:
         yield f"{answer.wrong[0]}: python -m campaign.explain_score --seed {answer.seed}"
 
 
+def doctored(night: Night) -> Iterator[str]:
+    """`canbase doctor` before robots whose truth is known: nothing that is well is accused."""
+    from campaign import doctor_score
+
+    for answer in doctor_score.answers(night.seeds(doctor_score.ROBOTS)):
+        if answer.wrong:
+            yield f"{answer.wrong[0]}: python -m campaign.doctor_score --seed {answer.seed}"
+
+
 def examples(night: Night) -> Iterator[str]:
     """Hypothesis: new examples, and each failing one as short as it can be."""
     files = [str(path) for path in sorted(TESTS.rglob("test_*.py")) if "hypothesis" in path.read_text(encoding="utf-8")]
@@ -109,6 +118,7 @@ STEPS: dict[str, Callable[[Night], Iterator[str]]] = {
     "odd": odd_drives,
     "soak": ordinary,
     "explain": explained,
+    "doctor": doctored,
     "hypothesis": examples,
 }
 

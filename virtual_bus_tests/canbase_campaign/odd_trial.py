@@ -105,7 +105,7 @@ def _put(section: dict[str, Any], key: str, value: Any) -> None:
 
 def attempt(robot: Robot, drives: Mapping[int, OddDrive], seed: int) -> Attempt:
     """One start of this robot, from power on."""
-    start = _Start(robot, drives, seed)
+    start = Start(robot, drives, seed)
     try:
         message = start.message()
     except Exception:  # noqa: BLE001 - whatever it is: that nothing raises is one of the properties
@@ -114,7 +114,9 @@ def attempt(robot: Robot, drives: Mapping[int, OddDrive], seed: int) -> Attempt:
     return Attempt(message, found, start.world.clock.now_s - start.began, start.resets)
 
 
-class _Start:
+class Start:
+    """One start from power on, in its own world."""
+
     def __init__(self, robot: Robot, drives: Mapping[int, OddDrive], seed: int) -> None:
         self.world = world = World(robot, seed, odd=drives)
         self.began, self.resets = world.clock.now_s, 0

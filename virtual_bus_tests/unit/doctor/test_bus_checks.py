@@ -12,7 +12,7 @@ from canbase_commissioning.bus_monitor import Listener
 from canbase_commissioning.can_interface import Link, parse_link
 from canbase_config.drive import Identity
 from canbase_config.load import load_robot, sample
-from canbase_doctor.bus_checks import BusEvidence, bus_checks
+from canbase_doctor.bus_checks import IN_USE, BusEvidence, bus_checks
 from canbase_doctor.check import Verdict
 from canbase_doctor.inspection import Inspection, Part
 from canbase_driver.cia301.frame import Frame
@@ -228,3 +228,44 @@ def test_a_drive_that_the_driver_could_not_boot_is_a_failure_and_nobody_is_accus
         failed = {check.name: check for check in bus_checks(seen) if check.verdict is Verdict.FAIL}
         assert "node 1 (left_wheel): state" in failed
         assert failed["node 1 (left_wheel): PDO mapping"].advice.startswith("the driver could not boot this drive")
+
+
+def test_more_syncs_than_the_drivers_are_another_masters_and_a_frame_twice_now_and_then_is_none() -> None:
+    for syncs, verdict in ((100, Verdict.OK), (140, Verdict.OK), (200, Verdict.FAIL)):
+        seen = evidence(heard=heard(*DRIVER, *WATCHDOG, *["080"] * (syncs - 1), *DRIVES), now_s=11.0)
+        assert next(check for check in bus_checks(seen) if check.name == "masters").verdict is verdict
+    alone_with_it = evidence(heard=heard("080", *WATCHDOG, *DRIVES))
+    assert "of which canbase's driver sends 0 → another program" in row(alone_with_it, "masters")
+
+
+@pytest.mark.parametrize(
+    ("cause", "frames", "advice"),
+    [
+        (1, DRIVER, "does safety_filter run"),
+        (2, DRIVER, "motor_driver lives now"),
+        (2, [], "does motor_driver run"),
+        (8, DRIVER, "another program"),
+        (10, DRIVER, "is this computer overloaded"),
+        (3, DRIVER, "remove the cause"),
+    ],
+)
+def test_a_trip_that_is_about_no_drive_names_the_part(cause: int, frames: list[str], advice: str) -> None:
+    seen = evidence(heard=heard(*frames, "77E 05", f"1FE 02 {cause:02X} 01 00 0A 00 00 00", *DRIVES))
+    assert f" → {advice}" in row(seen, "watchdog's state (1FEh)")
+    assert row(seen, "watchdog's state (1FEh)").endswith("canbase reset")
+
+
+def test_a_drive_that_sends_frames_and_does_not_answer_is_no_matter_of_its_channel() -> None:
+    silent = evidence(inspections={1: inspection(1)}, unread={2: "node 2, 6041h:0: no answer to 3 requests"})
+    assert "frames get lost" in row(silent, "node 2 (right_wheel)")
+    busy = evidence(inspections={1: inspection(1)}, unread={2: IN_USE})
+    assert "run doctor again" in row(busy, "node 2 (right_wheel)")
+
+
+def test_a_drive_that_is_booted_and_waits_for_another_one_is_not_accused() -> None:
+    waits = heard(*DRIVER, *WATCHDOG, "701 7F", *DRIVES[1:])
+    assert not_ok(evidence(heard=waits)) == [("node 1 (left_wheel): state", Verdict.WARN)]
+    assert "when all drives are ready" in row(evidence(heard=waits), "node 1 (left_wheel): state")
+    for differs in ({"settings": Part(("6085h",))}, {"pdos": Part(problem="no")}, {"wrong_identity": "another"}):
+        seen = evidence(heard=waits, inspections={1: inspection(1, **differs), 2: inspection(2)})
+        assert ("node 1 (left_wheel): state", Verdict.FAIL) in not_ok(seen)

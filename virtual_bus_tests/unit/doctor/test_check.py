@@ -9,7 +9,16 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from canbase.msg import DriverStatus, DriveStatus, ForeignPublisher, MuxSource, MuxState, SafetyState, ScannerState
+from canbase.msg import (
+    DriverStatus,
+    DriveStatus,
+    ForeignPublisher,
+    MuxLock,
+    MuxSource,
+    MuxState,
+    SafetyState,
+    ScannerState,
+)
 from rich.console import Console
 
 from canbase_config.load import load_robot, sample
@@ -129,7 +138,7 @@ def test_a_robot_that_is_well_has_nothing_but_good_rows_and_exit_code_0() -> Non
         (changed("safety_filter/state", action=SafetyState.STOP, cause="estop"), "safety_filter", "FAIL", "estop"),
         (changed("safety_filter/state", action=SafetyState.SLOW, detail="0.4 m"), "safety_filter", "warn", "0.4 m"),
         (changed("safety_filter/state", lease_errors=1), "safety_filter", "FAIL", "lease.socket"),
-        (drive_changed(error_code=0x2310), "drive right_wheel (node 2)", "FAIL", "0x2310"),
+        (drive_changed(error_code=0x2310, state="fault"), "drive right_wheel (node 2)", "FAIL", "0x2310"),
         (drive_changed(stops_by_itself=False), "drive right_wheel (node 2)", "warn", "will not stop"),
         (
             drive_changed(feedback_age_s=math.nan, heartbeat_age_s=math.nan),
@@ -208,3 +217,39 @@ def test_each_scanner_has_its_row(changes: dict[str, Any], dropped_before: int, 
     (row,) = [check for check in default_checks(evidence(now_s, before)) if check.name == "scanner scan"]
     assert row.verdict is verdict
     assert told in row.found
+
+
+def test_a_drive_that_stopped_because_the_watchdog_withholds_its_heartbeat_is_well() -> None:
+    seen = drive_changed(error_code=0x8130, state="switch on disabled")
+    assert not_ok(seen) == [("drive right_wheel (node 2)", Verdict.FAIL)]
+    seen.on("motor_driver/status").last.watchdog_rung = 4
+    assert not_ok(seen) == [("drive right_wheel (node 2)", Verdict.WARN)]
+    seen.on("motor_driver/status").last.drives[1].error_code = 0x2310
+    assert not_ok(seen) == [("drive right_wheel (node 2)", Verdict.FAIL)]
+
+
+def test_an_emergency_message_of_a_drive_that_drives_on_is_no_failure() -> None:
+    assert not_ok(drive_changed(error_code=0xFF01)) == [("drive right_wheel (node 2)", Verdict.WARN)]
+    assert not_ok(drive_changed(error_code=0xFF01, state="fault")) == [("drive right_wheel (node 2)", Verdict.FAIL)]
+
+
+def test_why_a_drive_does_not_boot_is_in_its_row() -> None:
+    failed = first_failure(default_checks(drive_changed(boot_problem="set `layout.velocity_bits: 16`")))
+    assert failed is not None
+    assert failed.found.endswith("set `layout.velocity_bits: 16`")
+
+
+@pytest.mark.parametrize(("heartbeat_s", "told"), [(12.0, "no frame received"), (0.1, "it is not booted yet")])
+def test_a_drive_without_feedback_is_not_said_to_run_on(heartbeat_s: float, told: str) -> None:
+    seen = drive_changed(feedback_age_s=math.nan, heartbeat_age_s=heartbeat_s, stops_by_itself=False)
+    [check] = [check for check in default_checks(seen) if check.verdict is not Verdict.OK]
+    assert told in check.found
+    assert "will not stop" not in check.advice
+
+
+def test_a_lock_that_holds_the_base_is_named() -> None:
+    held = MuxLock(name="gate", holds=True, reason="2 publishers on gate")
+    seen = changed("velocity_mux/state", locks=[held])
+    assert not_ok(seen) == [("velocity_mux", Verdict.WARN)]
+    assert not_ok(changed("velocity_mux/state", locks=[held], active="joystick")) == []
+    assert not_ok(changed("velocity_mux/state", locks=[MuxLock(name="gate")])) == []
