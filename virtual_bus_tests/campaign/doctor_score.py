@@ -139,6 +139,7 @@ def odd(seed: int) -> Answer:
     start = OddStart(campaign_robot(), drives, seed)
     message = start.message()
     rows = [row for row in doctor(start.world) if row.advice]
+    message = message or ("" if start.world.driver.enabled else "stopped while doctor looked")
     what = "; ".join([*(f"drive {node}: {each}" for node, each in drives.items()), message or "drove"])
     told = tuple(map(row_text, rows))
     strange = {node for node, each in drives.items() if each.drawn}
