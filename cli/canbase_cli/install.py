@@ -162,7 +162,5 @@ def uninstall(
 
     try:
         Executor(prefix, typer.echo, dry_run=dry_run).carry_out(uninstall_plan(name, manifests(prefix), purge=purge))
-    except InstallError as error:
-        fail(str(error), WRONG_INPUT)
-    except ExecuteError as error:
-        fail(str(error), FAILED)
+    except (InstallError, ExecuteError) as error:
+        fail(str(error), WRONG_INPUT if isinstance(error, InstallError) else FAILED)
