@@ -66,7 +66,7 @@ Drive = SentGoal[DriveResult]
 
 
 class DriveClient(GoalClient[DriveResult, DriveFeedback]):
-    """Sends goals from `node`, as GoalClient does."""
+    """Sends goals as GoalClient does."""
 
     def __init__(
         self,

@@ -26,7 +26,7 @@ class Numbers:
 
 
 class FibonacciClient(GoalClient[Numbers, "tuple[int, ...]"]):
-    """Sends goals from `node`. Nothing else may spin it while a method here waits, unless `executor` is its own."""
+    """Sends goals as GoalClient does."""
 
     def __init__(
         self, node: Node, executor: Executor | None = None, feedback_timeout_s: float = FEEDBACK_TIMEOUT_S

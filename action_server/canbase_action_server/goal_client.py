@@ -6,17 +6,14 @@ its executor spins, it publishes the client lease (action.require_client_lease i
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
-from threading import Lock
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 from uuid import uuid4
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -41,10 +38,6 @@ SLICE_S = 0.1
 """Longest time without a look at the deadline, at `interrupted`, and at whether the server is still there."""
 SERVER_LOST_S = 2.0
 """A server that cannot be seen for this long is lost."""
-SPUN_S = 1.0
-"""An executor that another thread spun within this time is left to that thread."""
-PASSIVE_S = 0.01
-"""Between two looks at what another thread handles."""
 KEEPALIVE_S = 0.1
 """Period of the client lease [s]; the shortest lease is three times as long."""
 SERVICE_QOS = QoSProfile(depth=100)
@@ -66,14 +59,10 @@ def never() -> bool:
 
 
 class GoalClient(Generic[ResultT, FeedbackT]):
-    """Sends goals from `node`, which `executor` spins, else the one that the node is in, else one for this client.
+    """Sends goals from a node of its own beside `node`, and spins that alone: whatever spins `node` does not matter.
 
-    Where another thread spins it, also for another client, the methods here only wait: two at once break rclpy's.
+    With `executor` it sends them from `node`, which is in that executor. Its methods spin it, and nothing else may.
     """
-
-    _claims: ClassVar[Lock] = Lock()
-    _spun_by_clients: ClassVar[set[int]] = set()
-    """Ids of the executors."""
 
     def __init__(
         self,
@@ -89,38 +78,29 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         FeedbackWatch(feedback_timeout_s)  # ValueError now, and not when a goal is sent
         name = action_name(action, node.resolve_topic_name, node.resolve_service_name)
         self._reasons = Reasons()
-        self._spun_elsewhere_s = -math.inf
-        group = MutuallyExclusiveCallbackGroup()  # a callback of the application may send a goal and wait
+        self._has_own_node = executor is None
+        if executor is None:
+            node, executor = _beside(node, name)
+        self._node, self._executor = node, executor
         # Before the client, so that a server that can receive a goal has found this subscription as well.
         self._rejections = node.create_subscription(
-            DiagnosticStatus, f"{name}/rejection", self._on_rejection, REJECTION_QOS, callback_group=group
+            DiagnosticStatus, f"{name}/rejection", self._on_rejection, REJECTION_QOS
         )
         self._client = ActionClient(
             node,
             kind,
             name,
-            callback_group=group,
             goal_service_qos_profile=SERVICE_QOS,
             result_service_qos_profile=SERVICE_QOS,
             cancel_service_qos_profile=SERVICE_QOS,
         )
-        shared = executor or node.executor  # a second executor would take the node away from the first client
-        self._executor: Executor = shared or SingleThreadedExecutor(context=node.context)
-        if shared is None:
-            self._executor.add_node(node)
-            node.context.on_shutdown(self._end)
         self._feedback_timeout_s = feedback_timeout_s
         self._read_feedback = read_feedback
         self.read_result = read_result
         self.action = action
         self._alive: list[Any] = []
         self._keepalive = node.create_publisher(UUID, f"{name}/keepalive", 10)
-        self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive, callback_group=group)
-        self._node = node
-
-    def _end(self) -> None:
-        """An executor that outlives its context complains on the terminal when it goes."""
-        self._executor.shutdown()
+        self._timer = node.create_timer(KEEPALIVE_S, self._tell_alive)
 
     @property
     def server_ready(self) -> bool:
@@ -134,34 +114,8 @@ class GoalClient(Generic[ResultT, FeedbackT]):
             left_s = SLICE_S if deadline is None else deadline - time.monotonic()
             if left_s <= 0.0:
                 return False
-            self._spin_once(min(SLICE_S, left_s))
+            self._executor.spin_once(timeout_sec=min(SLICE_S, left_s))
         return True
-
-    def _spin_once(self, timeout_s: float) -> None:
-        if not self._claim():
-            time.sleep(min(PASSIVE_S, timeout_s))
-            return
-        try:
-            self._executor.spin_once(timeout_sec=timeout_s)
-        except RuntimeError as error:
-            if "already-spinning" not in str(error):
-                raise
-            self._spun_elsewhere_s = time.monotonic()
-        finally:
-            self._spun_by_clients.discard(id(self._executor))
-
-    def _claim(self) -> bool:
-        """Whether this thread may spin. `_cb_iter` is of rclpy's executors in Python; EventsExecutor refuses itself."""
-        with self._claims:
-            now_s, callbacks = time.monotonic(), getattr(self._executor, "_cb_iter", None)
-            if id(self._executor) in self._spun_by_clients:
-                return False
-            if callbacks is not None and callbacks.gi_running:
-                self._spun_elsewhere_s = now_s
-            if now_s - self._spun_elsewhere_s < SPUN_S:
-                return False
-            self._spun_by_clients.add(id(self._executor))
-            return True
 
     def wait_for_server(self, timeout_s: float = 5.0, interrupted: Callable[[], bool] = never) -> None:
         """Until a server is found. NoServerError after timeout_s [s], InterruptedDriveError before."""
@@ -212,6 +166,9 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         self._node.destroy_publisher(self._keepalive)
         self._node.destroy_subscription(self._rejections)
         self._client.destroy()
+        if self._has_own_node:
+            self._executor.shutdown()
+            self._node.destroy_node()
 
     def _give_up(self, uuid: UUID, response: Any) -> None:
         """Nothing watches this goal: its cancel is queued at the server behind it, also when this process is gone."""
@@ -239,6 +196,27 @@ class GoalClient(Generic[ResultT, FeedbackT]):
                 on_feedback(self._read_feedback(message.feedback))
 
         return received
+
+
+def _beside(node: Node, action: str) -> tuple[Node, Executor]:
+    """A node for one client, and what spins it. `action`: resolved, so that it needs no remapping."""
+    own = Node(
+        f"{node.get_name()}_{action.rpartition('/')[2]}",
+        context=node.context,
+        namespace=node.get_namespace(),
+        use_global_arguments=False,
+        enable_rosout=False,
+        start_parameter_services=False,
+    )
+    return own, executor_of(own)
+
+
+def executor_of(node: Node) -> Executor:
+    """One for this node alone, which ends with its context: one that outlives it complains on the terminal."""
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    node.context.on_shutdown(cast("Callable[[], None]", executor.shutdown))
+    return executor
 
 
 def _cancel_late(response: Any) -> None:

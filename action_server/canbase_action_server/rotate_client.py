@@ -43,7 +43,7 @@ Turn = SentGoal[RotateResult]
 
 
 class RotateClient(GoalClient[RotateResult, RotateFeedback]):
-    """Sends goals from `node`, as GoalClient does."""
+    """Sends goals as GoalClient does."""
 
     def __init__(
         self,

@@ -258,6 +258,8 @@ class DriverCore:
         orders = self._state_machine.step(situation, now_s)
         self._record.note(self._state_machine, situation, self._readiness.allowed)
         state, finding = self._state_machine.state, self._state_machine.finding
+        if state in NO_POWER:
+            self._drives.forget_jumps()
         began = state is not before and state in (DriverState.STOPPING, DriverState.LATCHED)
         continued = before is DriverState.STOPPING and state in (DriverState.STOPPING, DriverState.LATCHED)
         if (began and not continued) or (continued and self._state_machine.latches and not latched_before):
@@ -305,7 +307,7 @@ class DriverCore:
         if outcome is not None and outcome.done:
             self._stop_requested = False
             self._state_machine.reset()
-            self._drives.forget_reports()
+            self._drives.forget_emcys()
         if outcome is not None:
             self._reset.end(outcome)
         return frames

@@ -263,11 +263,13 @@ def test_clients_share_the_executor_of_their_node(stage: GoalStage) -> None:
         each.close()
 
 
-def test_clients_on_a_node_without_an_executor_share_one(test_node: TestNode) -> None:
+def test_clients_leave_the_node_of_the_application_alone(test_node: TestNode) -> None:
     node = Node("application", context=test_node.node.context)
-    first, second = DriveClient(node), RotateClient(node)
-    assert node.executor is not None
-    assert first._executor is second._executor is node.executor
+    clients = (DriveClient(node), RotateClient(node))
+    assert node.executor is None
+    assert clients[0]._executor is not clients[1]._executor
+    for client in clients:
+        client.close()
     node.destroy_node()
 
 

@@ -135,6 +135,7 @@ def spinning(executor: Any) -> Iterator[None]:
     def spin() -> None:
         while not ended.is_set():
             executor.spin_once(timeout_sec=0.1)
+            time.sleep(0.01)  # the work of the application, in which nothing spins
 
     with ThreadPoolExecutor(1) as thread:
         spun = thread.submit(spin)

@@ -143,7 +143,7 @@ OF_THE_SETPOINTS = (
     ),
     BaseSign("left_right", lambda view: f"left and right wheels are ordered {view.skew}" if view.skew else ""),
 )
-AGAINST = "; it turns the other way: see `direction` in robot.yaml, motor phases, encoder"
+AGAINST = "; by 606Ch it turns the other way: see `direction` in robot.yaml, motor phases, encoder"
 
 
 def _motion_outside(view: View, config: WatchdogConfig, now_s: float) -> Verdict:
@@ -216,8 +216,8 @@ def _ghost(axis: Axis, config: WatchdogConfig) -> str:
     if not ghost.is_one:
         return ""
     return (
-        f"reports {axis.velocity_mps:.4f} m/s, {ghost.travel_m:.4f} m in all, and its encoder does not move: its drive "
-        "pushes against a motion that does not exist; see encoder"
+        f"reports {axis.velocity_mps:.4f} m/s, {ghost.travel_m:.4f} m in all, and its encoder (6064h) does not move: "
+        "one of them is wrong; see encoder, 606Ch"
     )
 
 
@@ -247,6 +247,9 @@ def _motion_missing(view: View, config: WatchdogConfig, now_s: float) -> Verdict
     return FINE
 
 
+MISSING_LOOK = "see encoder, motor, wheel, or a brake that opens late (watchdog.motion_missing_s)"
+
+
 def _unseen(axis: Axis, config: WatchdogConfig) -> str:
     evidence = axis.evidence
     if not evidence.unseen:
@@ -256,7 +259,7 @@ def _unseen(axis: Axis, config: WatchdogConfig) -> str:
         f"{max(evidence.unseen_s, evidence.both_s):.3f} s and {evidence.both_m:.3f} m of its orders (allowed "
         f"{config.motion_missing_s:.3f} s and {config.motion_missing_m:.3f} m, to and fro {BOTH_WAYS:g} times that "
         f"way: watchdog.motion_missing_m); it reports "
-        f"{axis.velocity_mps:.3f} m/s: see encoder, motor, brake, wheel"
+        f"{axis.velocity_mps:.3f} m/s: {MISSING_LOOK}"
     )
 
 
@@ -266,7 +269,7 @@ def _vain(axis: Axis, config: WatchdogConfig) -> str:
     return (
         f"is pushed with {_torque(axis)} and shows no motion for {axis.torque.vain_s:.3f} s (allowed "
         f"{config.motion_missing_s:.3f} s), ordered {axis.evidence.setpoint_mps:.3f} m/s: "
-        "see encoder, motor, brake, wheel"
+        f"{MISSING_LOOK}"
     )
 
 

@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_srvs.srv import Trigger
 
 from canbase_action_server.client import DriveClient, DriveResult
+from canbase_action_server.goal_client import executor_of
 from canbase_action_server.goal_errors import DriveError
 from canbase_config.robot import Robot as RobotConfig
 from canbase_runtime.foreign_text import SENTENCE_LENGTH, clean, printable
@@ -163,7 +164,7 @@ class Goals:
 
     def __init__(self) -> None:
         self.node = rclpy.create_node("canbase_web_goals", enable_rosout=False, start_parameter_services=False)
-        self._client = DriveClient(self.node)
+        self._client = DriveClient(self.node, executor_of(self.node))
         self._thread: threading.Thread | None = None
         self._canceled = threading.Event()
         self.text = "no goal yet: its progress and its result will be here"

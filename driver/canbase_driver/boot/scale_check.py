@@ -55,7 +55,7 @@ def _check_range(node: NodeAccess, drive: Drive) -> Steps[None]:
     turns = float(f"{width / drive.counts_per_motor_rev / drive.gear_ratio:.3g}")
     problem = (
         f"{index:04X}h lets 6064h of {drive.joint} wrap between {limits[0]} and {limits[1]}, each {turns:g} "
-        "revolutions of the wheel, and the pose of the odometry is reset there"
+        "revolutions of the wheel, where the pose of the odometry is reset, and the base stops at the second time"
     )
     tool = whole_range(drive)
     if turns < LEAST_TURNS:

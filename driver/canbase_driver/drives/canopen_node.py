@@ -240,7 +240,7 @@ class CanopenNode:
                 continue
             unasked_s = min(max(0.0, sync_since - axis.fed_at), timeouts.drive_heartbeat_s)
             if axis.age_s(now_s) - unasked_s > feedback_s:
-                value = "status" if axis.status_at <= axis.velocity_at else "velocity"
+                value = "status (6041h, 6064h)" if axis.status_at <= axis.velocity_at else "velocity (606Ch)"
                 return f"{self.name}: no {value} for {axis.age_s(now_s):.2f} s (timeouts.feedback_s {feedback_s:g} s)"
         if now_s - self.heartbeat_at > timeouts.drive_heartbeat_s:
             limit = f"timeouts.drive_heartbeat_s {self._robot.timeouts.drive_heartbeat_s:g} s"

@@ -245,10 +245,13 @@ class Drives:
                 return False
         return True
 
-    def forget_reports(self) -> None:
+    def forget_emcys(self) -> None:
         """After a reset: what the drives reported before it is no news any more; some never take it back."""
         for node in self.nodes:
             node.forget_emcy()
+
+    def forget_jumps(self) -> None:
+        """Of positions, while nothing has power: somebody may push the base, and some drives count anew."""
         for axis in self.axes:
             axis.travel.forget_jumps()
 
@@ -359,7 +362,7 @@ def _unprepared(node: CanopenNode, axis: Axis) -> str:
         return ""
     local = "" if axis.statusword & REMOTE else "; it is in local mode and ignores the controlword (statusword bit 9)"
     reports = f"; it reports {code}" if (code := node.emcy_text()) else ""
-    why = "see its display" if axis.state is DriveState.NOT_READY_TO_SWITCH_ON else "STO, main voltage?"
+    why = "see its display" if axis.state is DriveState.NOT_READY_TO_SWITCH_ON else "STO, main voltage, RPDO1?"
     state = axis.state.text if axis.state else "no state known"
     return f"{_place(axis)} is in {state}; if it stays: {why}{reports}{local}"
 

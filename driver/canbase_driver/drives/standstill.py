@@ -82,7 +82,7 @@ class Stillness:
         Without a statusword the time has not begun: the watchdog lets the drive boot once its own wait is over.
         """
         limit_s = self._limits.coasting_s
-        left_s = limit_s - max(now_s - self._off_since, 0.0)
+        left_s = limit_s - now_s + self._off_since
         todo = f"; repair it, and wait until its power has been off for {limit_s:.0f} s" if self._lie else ""
         left = f"{max(math.ceil(left_s), 0)} s left" if self._off_since < math.inf else f"up to {2.0 * limit_s:.0f} s"
         return f"{self.doubt}{todo} ({left})"

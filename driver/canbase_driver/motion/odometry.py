@@ -85,7 +85,7 @@ class WheelTravel:
         self.forget_jumps()
 
     def forget_jumps(self) -> None:
-        """After a reset: a counter that wraps shows it again."""
+        """A counter that wraps shows it again."""
         self._jump_counts = self.wraps_by = 0
 
     @property

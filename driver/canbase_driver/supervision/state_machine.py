@@ -28,9 +28,8 @@ from canbase_driver.supervision.phases import ORDERS, SHOWN, STOPPING, WAITING, 
 from canbase_driver.supervision.situation import Situation
 from canbase_runtime.driver_state import DriverState
 
-ENABLE_TIMEOUT_S = 5.0
-"""From the first controlword to operation enabled on all drives; real ones need up to 3 s (brake, bus charge, search
-for the commutation angle)."""
+ENABLE_TIMEOUT_S = 2.0
+"""From the first controlword to operation enabled on all drives; real ones need up to 1 s (brake, bus charge)."""
 PREPARE_TIMEOUT_S = 1.0
 """From nothing that forbids power to switched on on all drives: after it STO or the main voltage is missing."""
 POWER_OFF_TIMEOUT_S = 0.5

@@ -92,10 +92,9 @@ class OddNode(SimulatedNode):
         waits_for_power, waits_for_motion = axis.state is State.SWITCHED_ON, axis.state is State.OPERATION_ENABLED
         self._switched_on_at[number] = min(self._switched_on_at[number], now_s) if waits_for_power else math.inf
         self._enabled_at[number] = min(self._enabled_at[number], now_s) if waits_for_motion else math.inf
-        if manner.enable_late_s and axis.faults.cannot_enable is not now_s < (
-            self._switched_on_at[number] + manner.enable_late_s
-        ):
-            axis.faults.cannot_enable = not axis.faults.cannot_enable
+        is_late = now_s < self._switched_on_at[number] + manner.enable_late_s
+        if manner.enable_late_s and axis.faults.cannot_enable is not is_late:
+            axis.faults.cannot_enable = is_late
             axis._obey()
         is_motionless = now_s < self._enabled_at[number] + manner.motionless_s
         if manner.motionless_s and axis.faults.ignores_setpoints is not is_motionless:

@@ -387,7 +387,9 @@ def _held_velocity(random: Random) -> Drawn:
 def _velocity_spikes(random: Random) -> Drawn:
     mps = round(random.uniform(-0.5, 0.5), 2)
     change = with_manner(velocity_spike=round(19098.6 * mps))
-    return Drawn(f"606Ch is {mps} m/s beside the speed now and then", change, stops=frozenset(("changes of speed",)))
+    return Drawn(
+        f"606Ch is {mps} m/s beside the speed now and then", change, stops=frozenset(("changes of speed", "606Ch"))
+    )
 
 
 def _answers_again(random: Random) -> Drawn:
@@ -416,7 +418,7 @@ def _late_nmt(random: Random) -> Drawn:
 
 
 def _late_enable(random: Random) -> Drawn:
-    late_s = round(random.uniform(0.5, 3.0), 2)
+    late_s = round(random.uniform(0.2, 0.9), 2)
     return Drawn(f"needs {late_s} s for operation enabled", with_manner(enable_late_s=late_s))
 
 

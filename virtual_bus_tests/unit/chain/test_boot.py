@@ -59,8 +59,8 @@ def test_boots_beside_each_other_leave_room_for_heartbeats_on_a_bus_with_a_bit_r
 
 
 WAITED_FOR = {
-    "sto": "right_wheel (node 2) is in switch on disabled; if it stays: STO, main voltage?",
-    "no_mains": "right_wheel (node 2) is in ready to switch on; if it stays: STO, main voltage?",
+    "sto": "right_wheel (node 2) is in switch on disabled; if it stays: STO, main voltage, RPDO1?",
+    "no_mains": "right_wheel (node 2) is in ready to switch on; if it stays: STO, main voltage, RPDO1?",
 }
 
 

@@ -142,6 +142,19 @@ def test_a_counter_that_wraps_stops_the_base_at_the_second_time(world: World) ->
     assert world.recovered()
 
 
+def test_jumps_while_nothing_has_power_are_no_wrap() -> None:
+    """0 s: latched by motor_driver/stop; the base is pushed, and its encoder jumps twice ── then it drives again."""
+    world = World()
+    world.drive()
+    world.core.request_stop()
+    world.run_until(DriverState.LATCHED, 2.0)
+    for _ in range(2):
+        world.node.axes[0].encoder_offset -= 1 << 16
+        world.run(0.5)
+    assert world.recovered()
+    assert world.snapshot.state is DriverState.ENABLED
+
+
 def test_the_pose_is_set_at_a_standstill_only_and_the_way_goes_on_from_there() -> None:
     world = World()
     world.drive()

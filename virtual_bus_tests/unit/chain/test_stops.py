@@ -97,7 +97,7 @@ def test_a_velocity_that_no_longer_comes_stops_the_base_and_is_not_published_as_
     world.run(0.03)
     assert not world.snapshot.odometry.valid
     assert (world.core.state, world.core.finding.cause.value) == (DriverState.STOPPING, "drive silent")
-    assert world.core.finding.detail.startswith("node 1 (left_wheel): no velocity for 0.1")
+    assert world.core.finding.detail.startswith("node 1 (left_wheel): no velocity (606Ch) for 0.1")
     assert math.isfinite(world.snapshot.drives[0].feedback_age_s)
     assert not world.snapshot.standstill
 

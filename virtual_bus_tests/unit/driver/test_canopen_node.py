@@ -297,7 +297,7 @@ def test_with_both_it_is_ready() -> None:
 def test_a_status_that_is_too_old_is_silence(age_s: float, silent: bool) -> None:
     story = Story().ready()
     since = story.axis.status_at
-    sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s (timeouts.feedback_s 0.1 s)"
+    sentence = f"node 1 (left_wheel): no status (6041h, 6064h) for {age_s:.2f} s (timeouts.feedback_s 0.1 s)"
     assert story.node.silent(since + age_s, NEVER) == (sentence if silent else "")
 
 
@@ -316,7 +316,7 @@ def test_a_drive_that_was_not_asked_is_not_silent(run_s: float, age_s: float, si
     story = Story().ready()
     now_s = story.axis.status_at + age_s
     story.node.heartbeat_at = now_s
-    sentence = f"node 1 (left_wheel): no status for {age_s:.2f} s (timeouts.feedback_s 0.1 s)"
+    sentence = f"node 1 (left_wheel): no status (6041h, 6064h) for {age_s:.2f} s (timeouts.feedback_s 0.1 s)"
     assert story.node.silent(now_s, now_s - run_s) == (sentence if silent else "")
 
 

@@ -145,10 +145,14 @@ def test_a_fault_is_named_with_the_code_that_the_drive_gave(story: Story, word: 
 @pytest.mark.parametrize(
     ("word", "emcy", "said"),
     [
-        (0x0640, None, "switch on disabled; if it stays: STO, main voltage?"),
-        (0x0640, Emcy(2, 0xFF90, 0x80, b""), "switch on disabled; if it stays: STO, main voltage?; it reports FF90h"),
+        (0x0640, None, "switch on disabled; if it stays: STO, main voltage, RPDO1?"),
+        (
+            0x0640,
+            Emcy(2, 0xFF90, 0x80, b""),
+            "switch on disabled; if it stays: STO, main voltage, RPDO1?; it reports FF90h",
+        ),
         (0x0600, None, "not ready to switch on; if it stays: see its display"),
-        (0x0440, None, "switch on disabled; if it stays: STO, main voltage?; it is in local mode"),
+        (0x0440, None, "switch on disabled; if it stays: STO, main voltage, RPDO1?; it is in local mode"),
     ],
 )
 def test_a_drive_that_is_not_switched_on_is_told_with_where_to_look(
@@ -159,12 +163,12 @@ def test_a_drive_that_is_not_switched_on_is_told_with_where_to_look(
     assert story.drives.unprepared().startswith(f"right_wheel (node 2) is in {said}")
 
 
-def test_a_position_that_wraps_is_told_until_a_reset(story: Story) -> None:
+def test_a_position_that_wraps_is_told_until_there_is_no_power(story: Story) -> None:
     travel = story.drives.axes[1].travel
     assert story.drives.wrapping() == ""
     travel.wraps_by = 64_321
     assert story.drives.wrapping().startswith("right_wheel (node 2): 6064h has jumped twice by about 64000 counts")
-    story.drives.forget_reports()
+    story.drives.forget_jumps()
     assert story.drives.wrapping() == ""
 
 
@@ -172,7 +176,7 @@ def test_an_emergency_message_alone_is_no_fault_and_goes_with_a_reset(story: Sto
     story.drives.nodes[1].emcy = Emcy(2, 0x7305, 0x20, b"")
     assert story.drives.fault() == ""
     assert story.drives.snapshots(10.0)[1].error_text == "encoder"
-    story.drives.forget_reports()
+    story.drives.forget_emcys()
     assert story.drives.snapshots(10.0)[1].error_code == 0
 
 
@@ -180,7 +184,10 @@ def test_the_first_node_that_is_silent_is_named(story: Story) -> None:
     for node in story.drives.nodes:
         node.heartbeat_at = 10.0
     assert story.drives.silent(10.0, 9.0) == ""
-    assert story.drives.silent(10.2, 9.0) == "node 1 (left_wheel): no status for 0.20 s (timeouts.feedback_s 0.1 s)"
+    assert (
+        story.drives.silent(10.2, 9.0)
+        == "node 1 (left_wheel): no status (6041h, 6064h) for 0.20 s (timeouts.feedback_s 0.1 s)"
+    )
 
 
 def test_several_wheels_on_a_side_are_averaged_and_the_fastest_is_found() -> None:

@@ -167,11 +167,11 @@ def test_a_shutdown_without_power_ends_in_the_same_cycle(state: DriverState) -> 
     assert story.state_machine.finished
 
 
-def test_enabling_gives_up_after_five_seconds_and_needs_a_reset() -> None:
+def test_enabling_gives_up_after_two_seconds_and_needs_a_reset() -> None:
     story = at(ENABLING)
-    assert story.lasts(READY, ON) == pytest.approx(5.0, abs=0.021)
+    assert story.lasts(READY, ON) == pytest.approx(2.0, abs=0.021)
     assert story.told == (STOPPING, "enable timeout", True)
-    assert story.state_machine.finding.detail == "after 5.0 s left is switch on disabled"
+    assert story.state_machine.finding.detail == "after 2.0 s left is switch on disabled"
     story.step(READY, cycles=3)
     assert story.told == (LATCHED, "enable timeout", True)
 
@@ -320,9 +320,9 @@ def test_drives_may_take_a_whole_second_to_be_switched_on() -> None:
     assert exact((8.0, STO_OPEN), (just_after(9.0), STO_OPEN)).finding.cause is DriverCause.DRIVE_NOT_READY
 
 
-def test_drives_may_take_five_seconds_to_operation_enabled_and_then_it_is_a_quick_stop() -> None:
-    assert exact((8.0, READY), (13.0, READY)).phase is Phase.ENABLING
-    late = exact((8.0, READY), (just_after(13.0), READY))
+def test_drives_may_take_two_seconds_to_operation_enabled_and_then_it_is_a_quick_stop() -> None:
+    assert exact((8.0, READY), (10.0, READY)).phase is Phase.ENABLING
+    late = exact((8.0, READY), (just_after(10.0), READY))
     assert (late.phase, late.finding.cause, late.latches) == (Phase.QUICK_STOP, DriverCause.ENABLE_TIMEOUT, True)
 
 

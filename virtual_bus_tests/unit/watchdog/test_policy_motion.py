@@ -142,7 +142,7 @@ def test_the_sentences_about_feedback_have_the_values() -> None:
     for setpoint_mps, against in ((0.3, False), (0.0, False), (-0.001, True)):
         outside = replace(fast, setpoint_mps=setpoint_mps, feedback=Feedback(-0.1, 0.5, outside_samples=5))
         assert detail(outside, right).endswith(
-            "; it turns the other way: see `direction` in robot.yaml, motor phases, encoder"
+            "; by 606Ch it turns the other way: see `direction` in robot.yaml, motor phases, encoder"
         ) is (against)
     assert detail(replace(fast, feedback=Feedback(overspeed_samples=5)), right) == (
         "wheel_1_0 turns at 1.300 m/s (allowed 1.200 m/s)"
@@ -203,7 +203,7 @@ def test_the_sentences_about_evidence_have_the_values() -> None:
         "wheel_1_0 reports 0.100 m/s, and 5 changes of speed that no wheel can do (watchdog.jolt_mps2 20 m/s²)",
         "wheel_1_0 is ordered 0.300 m/s, and its encoder has not moved for 0.300 s and 0.090 m of its orders "
         "(allowed 0.250 s and 0.010 m, to and fro 2 times that way: watchdog.motion_missing_m); it reports 0.100 m/s: "
-        "see encoder, motor, brake, wheel",
+        "see encoder, motor, wheel, or a brake that opens late (watchdog.motion_missing_s)",
         "wheel_1_0 turns at 0.100 m/s, its setpoints order 0.300 m/s for 0.500 s "
         "(allowed 0.500 s; slow ramps: watchdog.slowest_ramp_mps2)",
         "wheel_1_0 is pushed with a torque that the drive does not report and gets no faster than 0.100 m/s for "
@@ -236,7 +236,7 @@ def test_the_sentence_about_power_at_a_stand_has_the_values() -> None:
 def test_the_sentence_about_a_push_in_vain_has_the_torque() -> None:
     assert detail(replace(AT_REST, torque=TorqueEvidence(0.7, vain_s=CONFIG.motion_missing_s))) == (
         "wheel_1_0 is pushed with 70% of the rated torque and shows no motion for 0.250 s (allowed 0.250 s), "
-        "ordered 0.000 m/s: see encoder, motor, brake, wheel"
+        "ordered 0.000 m/s: see encoder, motor, wheel, or a brake that opens late (watchdog.motion_missing_s)"
     )
 
 
