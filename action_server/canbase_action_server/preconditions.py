@@ -44,7 +44,14 @@ def state_reason(robot: Robot, inputs: Inputs, now_s: float, waits_for_program: 
     states = States.at(robot, inputs, now_s)
     if waits_for_program and states.mux is not None and commanding_program(robot, states):
         states = replace(states, mux=replace(states.mux, active=""))
-    return next(filter(None, silences), None) or _condition(robot, states)
+    silent = next(filter(None, silences), None)
+    return _condition(robot, states) if silent is None or _is_off(states) else silent
+
+
+def _is_off(states: States) -> bool:
+    """The driver reports it: that tells more than the odometry that is missing by it."""
+    driver = states.driver
+    return driver is not None and (driver.watchdog is not WatchdogView.OK or driver.state is not DriverState.ENABLED)
 
 
 def _condition(robot: Robot, states: States) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from canbase_recording.explanation import Explanation
     from canbase_recording.recording_facts import RecordingFacts
 
+SERVICES: Final = Path("/var/lib/canbase")
+RECORDINGS: Final = ("stop_*.asc", "watchdog_*.jsonl")
 LARGE_BYTES: Final = 10_000_000
 """From this size on there is a progress bar."""
 EPILOG: Final = (
@@ -47,12 +50,13 @@ RecordingConfig = Annotated[
 
 def explain(
     recording: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             metavar="FILE",
             help="ASC (a black box), watchdog_….jsonl, candump -L, BLF, TRC, or MCAP of canbase record export.",
+            show_default="the newest in ~/.local/state/canbase or /var/lib/canbase",
         ),
-    ],
+    ] = None,
     config: RecordingConfig = None,
     html: Annotated[
         Path | None, typer.Option("--html", metavar="FILE", help="Write a page that opens offline.")
@@ -77,6 +81,7 @@ def explain(
     from canbase_recording.explain_file import explain_file
     from canbase_recording.recording_file import NoRecordingError
 
+    recording = recording or _newest()
     robot, source = recorded_robot(recording, config)
     make_page = _page_maker() if html is not None else None
     if not recording.is_file():
@@ -98,6 +103,19 @@ def explain(
         except OSError as error:
             fail(f"{html} cannot be written: {error.strerror}", WRONG_INPUT)
         typer.echo(f"canbase: {html} written", err=True)
+
+
+def _newest() -> Path:
+    """The recording of the last stop of a robot of this user or of the services."""
+    from canbase_runtime.input_files import state_folder
+
+    folders = (state_folder(None, os.environ, Path.home()), SERVICES)
+    found = [file for folder in folders for kind in RECORDINGS for file in folder.glob(kind)]
+    if not found:
+        fail(f"{' and '.join(map(str, folders))} have no recording of a stop; name a FILE", WRONG_INPUT)
+    newest = max(found, key=lambda file: file.stat().st_mtime)
+    typer.echo(f"canbase: the newest recording: {newest}", err=True)
+    return newest
 
 
 def recorded_robot(recording: Path, config: Path | None) -> tuple[Robot | None, str]:

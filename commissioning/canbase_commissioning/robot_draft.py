@@ -142,7 +142,7 @@ def _ask_about_wheel(axis: FoundAxis, side: Side) -> Generator[Ask | Tell, Any, 
     counts = yield _ask(f"{key}.counts_per_motor_rev", text, _counts, _shown(axis.counts_per_motor_rev))
     unit = None
     if axis.lacks_unit:
-        text = f"What one bit of its velocities (60FFh) means: {', '.join(UNITS)}"
+        text = f"What one bit of its velocities (60FFh) means, by its manual or 60A9h: {', '.join(UNITS)}"
         unit = yield _ask(f"{key}.velocity_unit", text, _unit, axis.velocity_unit)
     return [Wheel(axis, where, gear, counts, unit)]
 

@@ -178,7 +178,7 @@ class RecordingFile:
         what = "it is empty" if not head else f"it begins with {first[:40]!r}"
         raise NoRecordingError(
             f"{self.path}: no recording that is known here (ASC, candump -L, BLF, TRC, MCAP of canbase record export, "
-            f"watchdog_….jsonl): {what}"
+            f"watchdog_….jsonl): {what}. Inputs of mux and filter (velocity_….jsonl): canbase record replay"
         )
 
     def _by_lines(self, reader: Callable[..., Iterable[can.Message]], *, is_asc: bool) -> Iterator[can.Message]:

@@ -27,7 +27,7 @@ WHY_DISABLED = {
     DriveState.SWITCH_ON_DISABLED: " (STO, main voltage?)",
     DriveState.READY_TO_SWITCH_ON: " (STO, main voltage?)",
     DriveState.SWITCHED_ON: " (an input that enables it, or a brake that opens slowly?)",
-    DriveState.QUICK_STOP_ACTIVE: " (it stopped by itself: a limit switch, or another input?)",
+    DriveState.QUICK_STOP_ACTIVE: " (stop frames of canbase, a limit switch, or another input?)",
 }
 """Where to look when a drive that shall have power has this state."""
 

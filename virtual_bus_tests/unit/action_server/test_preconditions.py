@@ -69,6 +69,8 @@ def test_a_robot_that_is_ready_has_no_reason_against_it() -> None:
         ({"safety": replace(GOOD_SAFETY, cause=StopCause.ESTOP_STALE)}, "emergency stop"),
         ({"driver": replace(GOOD_DRIVER, state=DriverState.LATCHED)}, "latched, not enabled"),
         ({"driver": replace(GOOD_DRIVER, watchdog=WatchdogView.MISSING)}, "watchdog is missing"),
+        ({"driver": replace(GOOD_DRIVER, watchdog=WatchdogView.TRIPPED), "odometry": None}, "watchdog is tripped"),
+        ({"driver": replace(GOOD_DRIVER, state=DriverState.LATCHED), "odometry": None}, "latched, not enabled"),
         ({"driver": replace(GOOD_DRIVER, hears_command=False)}, "receives no cmd_vel"),
         ({"mux": replace(GOOD_MUX, active="joystick")}, "joystick has the base"),
         ({"mux": replace(GOOD_MUX, held_back="locked: pause holds")}, "holds action back: locked: pause holds"),

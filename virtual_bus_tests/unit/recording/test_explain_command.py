@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from html.parser import HTMLParser
@@ -13,6 +14,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from typer.testing import CliRunner
 
+from canbase_cli import explain as explain_command
 from canbase_cli.main import app
 from canbase_config.load import load_robot, sample
 from canbase_driver.runtime.black_box_about import about
@@ -34,6 +36,25 @@ runner = CliRunner()
 def run(*arguments: str) -> tuple[int, str, str]:
     result = runner.invoke(app, list(arguments), catch_exceptions=False)
     return result.exit_code, result.stdout, result.stderr
+
+
+def test_without_a_file_it_takes_the_newest_recording_of_a_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.delenv("STATE_DIRECTORY", raising=False)
+    monkeypatch.setattr(explain_command, "SERVICES", tmp_path / "services")
+    code, _, err = run("explain")
+    assert (code, "have no recording of a stop; name a FILE" in err) == (2, True)
+    folder = tmp_path / "canbase"
+    folder.mkdir()
+    for age_s, (name, file) in enumerate((("stop_new.asc", CABLE), ("stop_old.asc", ENCODER), ("record.asc", LOADED))):
+        copied = shutil.copy(file, folder / name)
+        os.utime(copied, (1e9 - age_s, 1e9 - age_s))
+    code, out, err = run("explain", "--config", BENCH)
+    assert (code, "first cause:  node silent" in out) == (0, True)
+    assert "the newest recording:" in err
+    assert "stop_new.asc" in err.replace("\n", "")
 
 
 @pytest.mark.parametrize(
