@@ -54,7 +54,7 @@ def up(
         codes = stack.stop()
     bad = [str(Death(part, code)) for part, code in codes.items() if code != 0]
     if death is not None or bad:
-        fail("; ".join(bad) or str(death), FAILED)
+        fail(f"{'; '.join(bad) or death}; what happened, where a stop was recorded: canbase explain", FAILED)
 
 
 @contextmanager

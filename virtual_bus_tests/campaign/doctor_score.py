@@ -20,6 +20,7 @@ from random import Random
 from typing import Final
 
 from campaign.nightly import first_seed
+from campaign.scores import keep
 from canbase_campaign.advice import read_advice
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.forked import in_a_copy
@@ -179,6 +180,7 @@ def main() -> int:
         "--first", type=int, default=first_seed(datetime.now(timezone.utc).date()), help="seed of the first one"
     )
     parser.add_argument("--seed", type=int, help="tell this seed alone")
+    parser.add_argument("--keep", action="store_true", help="the score goes to scores.json, and so into the pages")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.robots) if given.seed is None else (given.seed,)
     scores: Counter[str] = Counter()
@@ -187,7 +189,10 @@ def main() -> int:
         if answer.wrong or given.seed is not None:
             print(told(answer), flush=True)
     total = scores.total()
-    print(", ".join(f"{scores[name]} {name}" for name in (RIGHT, CANNOT_TELL, WRONG)), f"of {total} robots")
+    score = f"{', '.join(f'{scores[name]} {name}' for name in (RIGHT, CANNOT_TELL, WRONG))} of {total} robots"
+    print(score)
+    if given.keep:
+        keep("doctor", score)
     return 1 if scores[WRONG] > MOST_WRONG * total else 0
 
 
