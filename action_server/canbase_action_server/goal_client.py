@@ -78,7 +78,7 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         FeedbackWatch(feedback_timeout_s)  # ValueError now, and not when a goal is sent
         name = action_name(action, node.resolve_topic_name, node.resolve_service_name)
         self._reasons = Reasons()
-        self._has_own_node = executor is None
+        self._beside, self._has_own_node = node, executor is None  # a node that nobody holds leaves the network
         if executor is None:
             node, executor = _beside(node, name)
         self._node, self._executor = node, executor

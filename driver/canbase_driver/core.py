@@ -188,7 +188,7 @@ class DriverCore:
 
     def request_reset(self, now_s: float, on_outcome: Callable[[RequestOutcome], None]) -> None:
         """Begin a reset; `on_outcome` is called once, at once when it is refused."""
-        if self._reset.begin(self._situation(now_s), self._state_machine.state in NO_POWER, now_s, on_outcome):
+        if self._reset.begin(self._situation(now_s), self._state_machine.state, now_s, on_outcome):
             for node in self._drives.nodes:
                 node.clear_lost_heartbeat(now_s)
 

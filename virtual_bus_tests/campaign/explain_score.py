@@ -3,8 +3,8 @@
 Each seed is one scenario in virtual time: ordinary use (a goal, the joystick, a stop and its reset, a power cycle),
 then one failure, none, or stops in turn: at standstill, two within 3 s, or one after a long hang. It is explained
 from the driver's black box and from a listener's frames, with and without robot.yaml, cut at both ends, with gaps in
-a node's frames, and read from ASC, BLF, TRC and candump files. Each answer is right, "cannot tell", or wrong. `--seed
-7` tells one. Exit code 1: more than one answer of a hundred is wrong.
+a node's frames, and read from ASC, BLF, TRC, candump and MCAP files. Each answer is right, "cannot tell", or wrong.
+`--seed 7` tells one. Exit code 1: more than one answer of a hundred is wrong.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from canbase_driver.runtime import black_box_notes as notes
 from canbase_recording.cause import Cause
 from canbase_recording.entry import Entry, FrameKind, Note, RecordedFrame
 from canbase_recording.explanation import Explanation, explain
+from canbase_recording.mcap_export import export
 from canbase_recording.recording_file import RecordingFile
 from canbase_recording.standstill import WheelStop
 from canbase_recording.story import Story
@@ -66,7 +67,8 @@ APPROACH_S: Final = 3.0
 BOX_S: Final = 10.0
 """`black_box.seconds`."""
 TITLE: Final = notes.title("motor_driver", DriverCause.STOP_REQUESTED.value, "service motor_driver/stop")
-FILES: Final = (".asc", ".blf", ".trc", ".log")
+MCAP: Final = ".mcap"
+FILES: Final = (".asc", ".blf", ".trc", ".log", MCAP)
 
 FAILED: Final = (
     *((next(twin for twin in TWINS if twin.key == (what, how)), box, wire) for what, how, box, wire in FAILURES),
@@ -336,12 +338,15 @@ def read(view: View) -> tuple[float, list[Entry]]:
     if not view.file or not entries:
         return 0.0, [Note(entries[0].at_s, view.title), *entries] if view.title else entries
     with tempfile.TemporaryDirectory(prefix="canbase-explain-") as folder:
-        path = Path(folder) / f"recording{view.file}"
+        path = Path(folder) / f"recording{'.asc' if view.file == MCAP else view.file}"
         with can.Logger(str(path)) as logger:
             for entry in entries:
                 assert isinstance(entry, RecordedFrame)
                 at = 1.7e9 + entry.at_s
                 logger(can.Message(at, entry.cob_id, is_extended_id=False, data=entry.data, channel=0))
+        if view.file == MCAP:
+            export(path, path.with_suffix(MCAP), view.robot, None)
+            path = path.with_suffix(MCAP)
         with RecordingFile(path) as recording:
             return entries[0].at_s, list(recording.entries())
 

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from canbase_driver.cia402 import FAULT_RESET_CYCLES
+from canbase_driver.supervision.phases import NO_POWER
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import ACCEPTED, ANSWERS
+from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
 WATCHDOG_TIMEOUT_S = 0.5
@@ -81,10 +83,12 @@ BREAKS: dict[ResetPhase, tuple[Callable[[Situation], str], ...]] = {
 """What ends a reset in each phase: what an earlier phase has found to be well must stay so."""
 
 
-def refusal(situation: Situation, stopped: bool) -> str | None:
-    """Why a reset may not even begin; None when it may. `stopped`: the state machine has taken all power away."""
-    if not stopped:
-        return "refused: the drives have power: a stop is under way, or the robot is enabled and needs no reset"
+def refusal(situation: Situation, state: DriverState) -> str | None:
+    """Why a reset may not even begin; None when it may."""
+    if state is DriverState.STOPPING:
+        return "refused: a stop is under way; reset again when it has ended"
+    if state not in NO_POWER:
+        return "refused: an enabled robot needs no reset. `canbase stop` takes the power off"
     problem = _first(REFUSALS, situation)
     return f"refused: {problem}" if problem else None
 

@@ -8,6 +8,7 @@ from canbase_driver.cia301.frame import Frame
 from canbase_driver.supervision.fault_reset import RequestOutcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import WatchdogLink
+from canbase_runtime.driver_state import DriverState
 
 OnOutcome = Callable[[RequestOutcome], None]
 
@@ -36,9 +37,9 @@ class ResetRun:
         """Bit 7 of the controlword of the drives in fault, in this cycle."""
         return self._sequence is not None and self._sequence.fault_reset_bit
 
-    def begin(self, situation: Situation, stopped: bool, now_s: float, on_outcome: OnOutcome) -> bool:
-        """Whether it begins; `on_outcome` is called at once when it is refused. `stopped`: nothing has power."""
-        refused = refusal(situation, stopped)
+    def begin(self, situation: Situation, state: DriverState, now_s: float, on_outcome: OnOutcome) -> bool:
+        """Whether it begins; `on_outcome` is called at once when it is refused."""
+        refused = refusal(situation, state)
         if refused is not None:
             on_outcome(RequestOutcome(False, refused))
             return False

@@ -197,10 +197,7 @@ def test_a_reset_is_refused_while_there_is_power(world: World) -> None:
     world.enable()
     outcome = world.reset()
     assert not outcome.done
-    assert (
-        outcome.sentence
-        == "refused: the drives have power: a stop is under way, or the robot is enabled and needs no reset"
-    )
+    assert outcome.sentence == "refused: an enabled robot needs no reset. `canbase stop` takes the power off"
     assert world.core.state is DriverState.ENABLED
 
 

@@ -10,6 +10,7 @@ import pytest
 from canbase_driver.supervision.fault_reset import FAULT_TRIES, RequestOutcome, Reset, ResetPhase, refusal
 from canbase_driver.supervision.situation import Situation
 from canbase_driver.supervision.watchdog_link import ANSWERS
+from canbase_runtime.driver_state import DriverState
 from canbase_runtime.watchdog_view import WatchdogView
 
 WELL = Situation()
@@ -82,7 +83,7 @@ def sentence(outcome: RequestOutcome | None) -> str:
     ],
 )
 def test_it_may_not_even_begin_while(situation: Situation, why: str) -> None:
-    refused = refusal(situation, stopped=True)
+    refused = refusal(situation, DriverState.LATCHED)
     assert refused is not None
     assert refused.startswith(f"refused: {why}")
 
@@ -101,13 +102,13 @@ def test_it_may_not_even_begin_while(situation: Situation, why: str) -> None:
     ],
 )
 def test_it_may_begin_with(situation: Situation) -> None:
-    assert refusal(situation, stopped=True) is None
+    assert refusal(situation, DriverState.LATCHED) is None
 
 
 def test_it_may_not_begin_while_there_is_power() -> None:
-    assert refusal(WELL, stopped=False) == (
-        "refused: the drives have power: a stop is under way, or the robot is enabled and needs no reset"
-    )
+    assert refusal(WELL, DriverState.STOPPING) == "refused: a stop is under way; reset again when it has ended"
+    for state in (DriverState.ENABLING, DriverState.ENABLED):
+        assert refusal(WELL, state) == ("refused: an enabled robot needs no reset. `canbase stop` takes the power off")
 
 
 @pytest.mark.parametrize("answer", [DONE, NOT_TRIPPED])
