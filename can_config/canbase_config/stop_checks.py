@@ -118,7 +118,7 @@ def _scans_of_any_age(robot: Robot, topic: str) -> str:
 
 def _commands_of_any_age(robot: Robot, name: str) -> str:
     return (
-        f"how old the commands of {name} are is unknown: after the operator has released the joystick the base drives "
+        f"how old the commands of {name} are is unknown: after its last command the base drives "
         f"on for as long as the network delays them, up to {robot.limits.linear_mps:g} m each second; stamped commands "
         "with same_clock true end that"
     )

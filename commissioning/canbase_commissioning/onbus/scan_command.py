@@ -45,11 +45,10 @@ def run(
     if roster.twins:
         fail(twins_advice(roster.twins), FAILED)
     if problem or len(absent) == len(rows):
-        fail(
-            problem
-            or "no node sends or answers; check power, cable, termination, bit rate (canbase bus adopt searches it)",
-            FAILED,
-        )
+        cure = "check power, cable, termination, bit rate (canbase bus adopt searches it)"
+        if bus.is_virtual:
+            cure = "do the simulated drives run (canbase up, or canbase serve sim), on this bus?"
+        fail(problem or f"no node sends or answers; {cure}", FAILED)
     if absent:
         fail(f"node {', '.join(map(str, absent))} of robot.yaml is not on the bus: power, cable, node id?", FAILED)
 
