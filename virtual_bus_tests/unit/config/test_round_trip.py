@@ -89,6 +89,7 @@ def made_consistent(values: Values) -> Values:
     safety["footprint"] = {side: max(size_m, 2.5) for side, size_m in safety["footprint"].items()}  # it has the wheels
     safety["stop_distance_m"] = min(safety.get("stop_distance_m", 0.15), 4.0)
     safety["slow_distance_m"] = safety["stop_distance_m"] + 0.5
+    safety["reaction_s"] = max(safety.get("reaction_s", 0.3), 0.2)  # two control cycles
     for index, scan in enumerate(safety.get("more_scans", [])):
         scan["topic"] = f"{scan.get('topic', 'scan')[:100].rstrip('/')}_{index}"
     for what in ("distance_m", "speed_mps", "angle_rad", "speed_radps"):
