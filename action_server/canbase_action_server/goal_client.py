@@ -59,9 +59,9 @@ def never() -> bool:
 
 
 class GoalClient(Generic[ResultT, FeedbackT]):
-    """Sends goals from a node of its own beside `node`, and spins that alone: whatever spins `node` does not matter.
+    """Sends goals from a node of its own, which only its methods spin; `node` gives name, namespace and context.
 
-    With `executor` it sends them from `node`, which is in that executor. Its methods spin it, and nothing else may.
+    With `executor` it sends them from `node`, which is in that executor: its methods spin it, and nothing else may.
     """
 
     def __init__(
@@ -78,9 +78,11 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         FeedbackWatch(feedback_timeout_s)  # ValueError now, and not when a goal is sent
         name = action_name(action, node.resolve_topic_name, node.resolve_service_name)
         self._reasons = Reasons()
-        self._beside, self._has_own_node = node, executor is None  # a node that nobody holds leaves the network
+        self._application = node  # else a node that is created in the call would be destroyed
+        self._has_own_node = executor is None
         if executor is None:
-            node, executor = _beside(node, name)
+            node = _own_node(node, name)
+            executor = executor_of(node)
         self._node, self._executor = node, executor
         # Before the client, so that a server that can receive a goal has found this subscription as well.
         self._rejections = node.create_subscription(
@@ -198,9 +200,9 @@ class GoalClient(Generic[ResultT, FeedbackT]):
         return received
 
 
-def _beside(node: Node, action: str) -> tuple[Node, Executor]:
-    """A node for one client, and what spins it. `action`: resolved, so that it needs no remapping."""
-    own = Node(
+def _own_node(node: Node, action: str) -> Node:
+    """The node of one client. `action`: resolved, so that it needs no remapping."""
+    return Node(
         f"{node.get_name()}_{action.rpartition('/')[2]}",
         context=node.context,
         namespace=node.get_namespace(),
@@ -208,11 +210,10 @@ def _beside(node: Node, action: str) -> tuple[Node, Executor]:
         enable_rosout=False,
         start_parameter_services=False,
     )
-    return own, executor_of(own)
 
 
 def executor_of(node: Node) -> Executor:
-    """One for this node alone, which ends with its context: one that outlives it complains on the terminal."""
+    """An executor for this node alone. It ends with the context: one that outlives it prints an error."""
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     node.context.on_shutdown(cast("Callable[[], None]", executor.shutdown))

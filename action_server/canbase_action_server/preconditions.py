@@ -49,7 +49,7 @@ def state_reason(robot: Robot, inputs: Inputs, now_s: float, waits_for_program: 
 
 
 def _is_off(states: States) -> bool:
-    """The driver reports it: that tells more than the odometry that is missing by it."""
+    """The driver reports that the drives are off, which is also why there is no odometry."""
     driver = states.driver
     return driver is not None and (driver.watchdog is not WatchdogView.OK or driver.state is not DriverState.ENABLED)
 

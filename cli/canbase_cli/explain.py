@@ -113,9 +113,17 @@ def _newest() -> Path:
     found = [file for folder in folders for kind in RECORDINGS for file in folder.glob(kind)]
     if not found:
         fail(f"{' and '.join(map(str, folders))} have no recording of a stop; name a FILE", WRONG_INPUT)
-    newest = max(found, key=lambda file: file.stat().st_mtime)
+    newest = max(found, key=_written_s)
     typer.echo(f"canbase: the newest recording: {newest}", err=True)
     return newest
+
+
+def _written_s(file: Path) -> float:
+    """When [s, since 1970]; 0 for one that the driver has just deleted."""
+    try:
+        return file.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def recorded_robot(recording: Path, config: Path | None) -> tuple[Robot | None, str]:

@@ -250,10 +250,10 @@ def _record_text(path: Path, robot: str, words: Words) -> str:
 
 
 def _box_folders(robot: Robot | None, state: Path) -> list[Path]:
-    from canbase_driver.runtime.black_box_writer import state_folder
+    from canbase_runtime.input_files import state_folder
 
     own = [Path(robot.black_box.folder)] if robot and robot.black_box.folder else []
-    return [*own, state_folder(os.environ, Path.home()), state, *([state / robot.name] if robot else [])]
+    return [*own, state_folder(None, os.environ, Path.home()), state, *([state / robot.name] if robot else [])]
 
 
 def _versions() -> str:

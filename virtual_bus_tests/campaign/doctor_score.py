@@ -1,4 +1,4 @@
-"""`python -m campaign.doctor_score --robots 100`: does the first advice of `canbase doctor` lead to what is wrong?
+"""`python -m campaign.doctor_score --seeds 100`: does the first advice of `canbase doctor` lead to what is wrong?
 
 Each seed is two robots in virtual time: one with the odd drives of this seed after its start and a drive of 1 m, and
 the sample robot with one lasting fault, at rest or in motion, or none. The truth is what was drawn. The first advice is
@@ -8,19 +8,15 @@ well is accused. Cannot tell: it names none. `--seed 7` tells one. Exit code 1: 
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
 from functools import partial
 from random import Random
 from typing import Final
 
-from campaign.nightly import first_seed
-from campaign.scores import keep
+from campaign.scores import CANNOT_TELL, RIGHT, WRONG, main
 from canbase_campaign.advice import read_advice
 from canbase_campaign.faults import FAULTS
 from canbase_campaign.forked import in_a_copy
@@ -33,8 +29,6 @@ from canbase_velocity.twist import Twist
 from support.doctor_look import doctor
 
 ROBOTS = 100
-MOST_WRONG: Final = 0.01
-RIGHT, CANNOT_TELL, WRONG = "right", "cannot tell", "wrong"
 DRIVES_S, LASTS_S, JOYSTICK_S = 1.5, 3.0, 0.02
 UNSURE: Final = ("cannot tell", "run doctor again")
 WHEEL: Final = ""
@@ -172,29 +166,5 @@ def told(answer: Answer) -> str:
     return "\n    ".join((*lines, *(f"WRONG: {what}" for what in answer.wrong)))
 
 
-def main() -> int:
-    """Seeds from the command line."""
-    parser = argparse.ArgumentParser(prog="campaign.doctor_score", description=__doc__)
-    parser.add_argument("--robots", type=int, default=ROBOTS, help="seeds; each is two robots")
-    parser.add_argument(
-        "--first", type=int, default=first_seed(datetime.now(timezone.utc).date()), help="seed of the first one"
-    )
-    parser.add_argument("--seed", type=int, help="tell this seed alone")
-    parser.add_argument("--keep", action="store_true", help="the score goes to scores.json, and so into the pages")
-    given = parser.parse_args()
-    seeds = range(given.first, given.first + given.robots) if given.seed is None else (given.seed,)
-    scores: Counter[str] = Counter()
-    for answer in answers(seeds):
-        scores[answer.score] += 1
-        if answer.wrong or given.seed is not None:
-            print(told(answer), flush=True)
-    total = scores.total()
-    score = f"{', '.join(f'{scores[name]} {name}' for name in (RIGHT, CANNOT_TELL, WRONG))} of {total} robots"
-    print(score)
-    if given.keep:
-        keep("doctor", score)
-    return 1 if scores[WRONG] > MOST_WRONG * total else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main("doctor", "robots", __doc__, ROBOTS, answers, told))

@@ -1,4 +1,4 @@
-"""`python -m campaign.explain_score --scenarios 300`: recordings whose truth is known; is `canbase explain` right?
+"""`python -m campaign.explain_score --seeds 300`: recordings whose truth is known; is `canbase explain` right?
 
 Each seed is one scenario in virtual time: ordinary use (a goal, the joystick, a stop and its reset, a power cycle),
 then one failure, none, or stops in turn: at standstill, two within 3 s, or one after a long hang. It is explained
@@ -9,15 +9,12 @@ a node's frames, and read from ASC, BLF, TRC, candump and MCAP files. Each answe
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import tempfile
 from bisect import bisect_left, bisect_right
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -26,8 +23,7 @@ from typing import Final
 
 import can
 
-from campaign.nightly import first_seed
-from campaign.scores import keep
+from campaign.scores import CANNOT_TELL, RIGHT, WRONG, main
 from canbase_campaign.forked import in_a_copy
 from canbase_campaign.scenario import Start
 from canbase_campaign.twins import GOAL, TWINS, Twin
@@ -48,7 +44,6 @@ from support.recorded_failures import FAILURES, MORE
 from support.recorded_world import WorldRecorder
 
 SCENARIOS = 300
-MOST_WRONG: Final = 0.01
 LOOK_S, JOYSTICK_S, RESTS_S = 0.005, 0.02, 0.6
 EARLY_S: Final = 0.15
 """The last sign of life of what fails lies so much before the failure at most: a heartbeat's period and half of it."""
@@ -57,7 +52,6 @@ STOOD_S, PATH_M, PATH_SHARE, GAP_S = 0.15, 0.01, 0.05, 0.1
 SEEN_S: Final = 0.7
 """A failure that lies so close to an end of the recording need not be in it."""
 BOX, WIRE = "black box", "listener"
-RIGHT, CANNOT_TELL, WRONG = "right", "cannot tell", "wrong"
 NO_ANSWER: Final = (Cause.UNKNOWN, Cause.REPORTED)
 WEAK: Final = (Cause.WHEEL_SLOW, Cause.NO_MOTION)
 """Of a wheel that gets ever slower."""
@@ -479,29 +473,5 @@ def told(answer: Answer) -> str:
     return "\n    ".join((f"seed {answer.seed}, {answer.view}: {answer.score}", "; ".join(answer.what), *answer.wrong))
 
 
-def main() -> int:
-    """Seeds from the command line."""
-    parser = argparse.ArgumentParser(prog="campaign.explain_score", description=__doc__)
-    parser.add_argument("--scenarios", type=int, default=SCENARIOS, help="how many")
-    parser.add_argument(
-        "--first", type=int, default=first_seed(datetime.now(timezone.utc).date()), help="seed of the first one"
-    )
-    parser.add_argument("--seed", type=int, help="tell this scenario alone")
-    parser.add_argument("--keep", action="store_true", help="the score goes to scores.json, and so to docs/explain.md")
-    given = parser.parse_args()
-    seeds = range(given.first, given.first + given.scenarios) if given.seed is None else (given.seed,)
-    scores: Counter[str] = Counter()
-    for answer in answers(seeds):
-        scores[answer.score] += 1
-        if answer.wrong or given.seed is not None:
-            print(told(answer), flush=True)
-    total = scores.total()
-    score = f"{', '.join(f'{scores[name]} {name}' for name in (RIGHT, CANNOT_TELL, WRONG))} of {total} recordings"
-    print(score)
-    if given.keep:
-        keep("explain", score)
-    return 1 if scores[WRONG] > MOST_WRONG * total else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main("explain", "recordings", __doc__, SCENARIOS, answers, told))

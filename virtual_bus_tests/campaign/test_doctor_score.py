@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
 import pytest
 
-from campaign.doctor_score import CANNOT_TELL, RIGHT, WRONG, Answer, answers, judge_fault, names, told
+from campaign import scores
+from campaign.doctor_score import Answer, answers, judge_fault, names, told
+from campaign.scores import CANNOT_TELL, RIGHT, WRONG
 from canbase_campaign.scenario import Start
 from canbase_doctor.check import Check, fail, warn
 from support.doctor_look import doctor
@@ -46,3 +52,17 @@ def test_a_robot_that_is_well_is_right_without_a_row_and_wrong_with_an_accusatio
 
     assert healthy([]).score == RIGHT
     assert healthy([warn("masters", "SYNC", "another program commands this bus: end it")]).score == WRONG
+
+
+@pytest.mark.parametrize(("wrong", "code"), [(1, 0), (2, 1)])
+def test_more_than_one_wrong_answer_of_a_hundred_fails_and_the_score_is_kept(
+    wrong: int, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scores, "FILE", tmp_path / "scores.json")
+
+    def hundred(seeds: Iterable[int]) -> list[Answer]:
+        return [Answer(seed, "", ("accused",) if at < wrong else ()) for at, seed in enumerate(seeds)]
+
+    assert scores.main("doctor", "robots", "", 100, hundred, told, ["--keep"]) == code
+    kept = {"doctor": f"{100 - wrong} right, 0 cannot tell, {wrong} wrong of 100 robots"}
+    assert json.loads(scores.FILE.read_text(encoding="utf-8")) == kept

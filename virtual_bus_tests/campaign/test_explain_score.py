@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.explain_score import WRONG, answers, told
+from campaign.explain_score import answers, told
+from campaign.scores import WRONG
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(600)]
 WERE_WRONG = (6003, 6036, 6047, 6089, 6128)

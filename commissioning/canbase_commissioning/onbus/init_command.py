@@ -38,8 +38,8 @@ def run(bus: Bus, output: Path, answers: Path | None, timeout_s: float, *, yes: 
             fail(f"{file} exists; it is never overwritten: give --output another name", WRONG_INPUT)
     person: Person = RemoteOperator() if as_json else Operator(answers, yes=yes)
     if bus.is_virtual:
-        values = "the gear_ratio and velocity_unit of the robot.yaml that they were started with"
-        person.tell(Tell(f"The simulated drives have {values}; those of --bench have 20 and 0.1rpm"))
+        values = "gear_ratio and velocity_unit are those of the robot.yaml with which they were started"
+        person.tell(Tell(f"Simulated drives: {values} (20 and 0.1rpm with --bench)"))
     with open_line(bus) as line:
         axes = _axes(line, timeout_s, person)
     if len(axes) < 2:

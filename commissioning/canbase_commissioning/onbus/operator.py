@@ -94,7 +94,7 @@ def answered(person: Person, question: Ask, turn: Callable[[], None]) -> object:
 
 
 class NoAnswerError(CommissionError):
-    """Nobody is there to answer these questions."""
+    """These questions have no answer: there is no terminal, and --answers does not have them."""
 
     def __init__(self, *questions: Ask) -> None:
         keys = [question.key for question in questions]

@@ -25,6 +25,7 @@ from canbase_driver.runtime.black_box import Cut, EventEntry, Recording, asc_lin
 from canbase_driver.runtime.black_box_json import json_lines
 from canbase_driver.runtime.black_box_notes import title
 from canbase_driver.supervision.stop_history import StopRecord
+from canbase_runtime.input_files import state_folder
 
 WAITING = 4
 """Recordings that may wait to be written; more are dropped: a stop every second shows nothing new."""
@@ -41,14 +42,6 @@ SUFFIXES = (".json", ".asc")
 T = TypeVar("T")
 Late = Callable[[Recording], Iterable[EventEntry]]
 """Events of the time of a recording that something else has kept, one by one; called from the writer's thread."""
-
-
-def state_folder(environment: Mapping[str, str], home: Path) -> Path:
-    """Where recordings go by default: what systemd gives (StateDirectory=), else the user's state folder."""
-    given = environment.get("STATE_DIRECTORY", "").partition(":")[0]
-    if given:
-        return Path(given)
-    return Path(environment.get("XDG_STATE_HOME") or home / ".local" / "state") / "canbase"
 
 
 Written = Callable[[str, str], None]
@@ -78,7 +71,7 @@ class BlackBoxWriter(threading.Thread):
         """`say`: takes a sentence for the log, from this thread. `about`: what each .json file has of robot and
         software, black_box_about.py."""
         super().__init__(name="black box", daemon=True)
-        self._folder = Path(config.folder) if config.folder else state_folder(os.environ, Path.home())
+        self._folder = state_folder(config.folder, os.environ, Path.home())
         self._robot = robot
         self._files = config.files
         self._say, self._about = say, about or {}

@@ -36,7 +36,7 @@ def test_two_drives_become_a_robot_yaml_that_passes_the_check(world: CommandWorl
         (1, "left", 4096, "0.1rpm"),
         (2, "right", 4096, "0.1rpm"),
     ]
-    assert "those of --bench have 20 and 0.1rpm" in done.stdout
+    assert "20 and 0.1rpm with --bench" in done.stdout
     assert f"canbase setup commission --config {output}" in done.stdout
     assert canbase("config", "check", "--config", str(output)).exit_code == 0
 

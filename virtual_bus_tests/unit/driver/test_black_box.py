@@ -28,9 +28,10 @@ from canbase_driver.runtime.black_box import (
 )
 from canbase_driver.runtime.black_box_about import about, sha256_of
 from canbase_driver.runtime.black_box_json import json_lines
-from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, Written, state_folder
+from canbase_driver.runtime.black_box_writer import WAITING, BlackBoxWriter, Written
 from canbase_driver.runtime.bus_port import BusPort
 from canbase_driver.supervision.stop_history import NOBODY, StopRecord
+from canbase_runtime.input_files import state_folder
 
 WALL_S = 1_700_000_000.0
 SETPOINT = bytes.fromhex("0f 00 10 27 00 00")
@@ -328,7 +329,7 @@ def test_a_defect_in_it_is_kept_for_the_main_thread(box: Box, monkeypatch: pytes
     ],
 )
 def test_where_files_go_by_default(environment: dict[str, str], folder: str) -> None:
-    assert state_folder(environment, Path("/home/u")) == Path(folder)
+    assert state_folder(None, environment, Path("/home/u")) == Path(folder)
 
 
 # ---- recordings on request
